@@ -17,9 +17,11 @@ from tankcal.geometry.circles import (
     radial_covariance,
     taubin_circle,
 )
-from tankcal.geometry.form import Sample, free_columns, harmonics
 from tankcal.geometry.outlines import (
     Outline,
+    Sample,
+    free_columns,
+    harmonics,
     polar,
     radii_by_coordinates,
     radii_square_to_axis,

@@ -193,9 +193,8 @@ def _remedies(plan, error, options, show):
 def _simulate(prediction, options, show):
     if options.simulate is None:
         return None
-    from tankcal.planning.simulations import simulate
+    from tankcal.planning.simulations import simulate, simulate_walls
     from tankcal.planning.wall.prediction import WallPrediction
-    from tankcal.planning.wall.simulations import simulate_walls
 
     draw = simulate_walls if isinstance(prediction, WallPrediction) else simulate
     return draw(prediction, options.simulate, options.seed, options.blunders, show.part)

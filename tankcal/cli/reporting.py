@@ -4,7 +4,7 @@ from pathlib import Path
 
 from tankcal.terminal.arguments import add_letterhead, read_letterhead
 from tankcal.terminal.showing import Progress, print_paths, speak
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 
 
 def add(commands):

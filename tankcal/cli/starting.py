@@ -6,7 +6,7 @@ from pathlib import Path
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message, printable
 from tankcal.terminal.showing import language_of_run, say, speak
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 
 USUAL_KIND = "vertical"
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.terminal.showing import complain, prepare_for_small_work, say, speak
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 from tankcal.version import install_command
 
 MOST_PORT = 65535

@@ -19,8 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from tankcal import record as records
-from tankcal.exports.choosing import ON_THE_MARK_M, RowRequest
-from tankcal.exports.writing import file_text, make_body, read_back
+from tankcal.exports.writing import ON_THE_MARK_M, RowRequest, file_text, make_body, read_back
 from tankcal.job.tables import Log
 from tankcal.messages import message
 from tankcal.text.naming import file_name

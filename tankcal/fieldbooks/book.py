@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass, field
 
 from tankcal.messages import message
-from tankcal.text.numerals import NUMBER
+from tankcal.text.naming import NUMBER
 from tankcal.units import FOOT_M, US_SURVEY_FOOT_M
 
 FULL_TURN, HALF_TURN = 360.0, 180.0

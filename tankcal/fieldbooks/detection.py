@@ -8,7 +8,7 @@ from tankcal.fieldbooks import gsi, jobxml, profile, rw5, sdr
 from tankcal.job.folder import has_too_many_lines
 from tankcal.job.tables import Log
 from tankcal.messages import message
-from tankcal.text.decoding import decode_text, find_encoding
+from tankcal.text.delimited import decode_text, find_encoding
 
 FORMATS = ("gsi", "rw5", "jxl", "sdr", "csv")
 NAMES = {

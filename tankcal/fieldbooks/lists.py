@@ -14,8 +14,7 @@ from tankcal.job.folder import declared_marks, parsed_toml, read_csv, read_toml
 from tankcal.job.headings import Meaning, meanings_of, stated_meaning
 from tankcal.job.tables import NOT_KNOWN, SETTINGS_FILE, Log, Table, nearest, read_bytes
 from tankcal.messages import message
-from tankcal.text.naming import MAX_NAME
-from tankcal.text.numerals import NUMBER
+from tankcal.text.naming import MAX_NAME, NUMBER
 
 MEMORY_FILE = "headings.toml"  # in the job folder: meanings of headings of earlier lists
 MOST_DECIMALS = 9  # decimals of a converted length in the unit of the column

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.adjust import CRITICAL, SD_OVER_MEDIAN, Adjustment, adjust, snoop
-from tankcal.geometry.form import harmonics, mode_variances
+from tankcal.geometry.outlines import harmonics, mode_variances
 
 FITTED = 800  # approximate number of points in the fit of the form; at most twice as many
 MODES = 24  # highest mode of the form in the snooping

@@ -34,7 +34,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from tankcal.geometry.form import harmonics
+from tankcal.geometry.outlines import harmonics
 
 LEVEL_M = 1e-9  # range of elevations that is due to rounding; such points are level
 NEARLY = 1.25  # number of points over the size of the subset, up to which all points are used

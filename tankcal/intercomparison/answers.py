@@ -19,7 +19,7 @@ from tankcal.job.folder import MAX_SETTINGS_BYTES, declared_marks, read_csv, rea
 from tankcal.job.tables import SEPARATORS, nearest, read_bytes
 from tankcal.messages import list_some, message
 from tankcal.record.intercomparison import ANSWERS, Answer, AnswersFile, Participant
-from tankcal.text.decoding import find_encoding
+from tankcal.text.delimited import find_encoding
 from tankcal.version import find_version
 
 PARTICIPANT = "participant.toml"

@@ -9,8 +9,7 @@ import re
 
 from tankcal.job.tables import NOT_KNOWN, shown
 from tankcal.messages import message
-from tankcal.text.naming import MAX_NAME
-from tankcal.text.numerals import NUMBER
+from tankcal.text.naming import MAX_NAME, NUMBER
 
 _TWO_MEANINGS = re.compile(r"[+-]?[1-9][0-9]{0,2}[.,][0-9]{3}")
 

@@ -13,8 +13,7 @@ from tankcal.job.fields import Field, Refused, is_blank
 from tankcal.job.tables import nearest, shown
 from tankcal.messages import message
 from tankcal.text.form_words import NO, YES, meant
-from tankcal.text.naming import MAX_NAME
-from tankcal.text.numerals import NUMBER
+from tankcal.text.naming import MAX_NAME, NUMBER
 
 
 @dataclass(frozen=True)

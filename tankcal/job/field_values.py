@@ -15,8 +15,7 @@ from tankcal.job.hints import hint_of_date, hint_of_number, hint_of_text
 from tankcal.job.tables import BadCell, Percent, nearest, shown
 from tankcal.messages import message
 from tankcal.text.form_words import NO, YES, meant
-from tankcal.text.naming import MAX_NAME, is_name
-from tankcal.text.numerals import NUMBER
+from tankcal.text.naming import MAX_NAME, NUMBER, is_name
 
 MAX_LIST = 50  # largest count of numbers or pairs in one value
 MAX_NAMES = 5000  # largest count of names in one value

@@ -26,8 +26,14 @@ from tankcal.job.tables import (
     shown,
 )
 from tankcal.messages import message
-from tankcal.text.decoding import WESTERN, decode_text, is_western
-from tankcal.text.delimited import separator_of_table, split_cells, unguard_formula
+from tankcal.text.delimited import (
+    WESTERN,
+    decode_text,
+    is_western,
+    separator_of_table,
+    split_cells,
+    unguard_formula,
+)
 
 SAVED_FILES = (  # results of commands; such a file without job.toml marks a folder of results
     *("record.json", "comparison.json", "inspection.json", "history.json", "camera.json"),

@@ -12,7 +12,7 @@ from tankcal.job.tables import SETTINGS_FILE, WORKBOOK_FILE, Log
 from tankcal.messages import message
 from tankcal.methods.base import methods
 from tankcal.text.form_words import NO, YES, meant
-from tankcal.text.numerals import NUMBER
+from tankcal.text.naming import NUMBER
 
 OF_EVERY_FORM = (("tank", "kind"), ("table", "language"))  # filled in by every starter job
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from tankcal.messages import message
-from tankcal.text.languages import LANGUAGES
-from tankcal.text.unit_endings import split_unit
+from tankcal.text.naming import split_unit
+from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import load_words
 
 USUAL = {  # usual headings, by the name of the column without its unit

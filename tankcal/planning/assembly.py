@@ -11,7 +11,7 @@ from tankcal.geometry.field.amplitudes import assumed_amplitudes
 from tankcal.geometry.rotations import rotation_of_view
 from tankcal.job.measuring import ARCSEC
 from tankcal.planning.bases import bases_of
-from tankcal.planning.entries import PLAN_FILE, forms_m
+from tankcal.planning.contract import PLAN_FILE, forms_m
 from tankcal.planning.model import (
     ControlPoint,
     Limits,

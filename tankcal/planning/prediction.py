@@ -12,7 +12,7 @@ from tankcal.pipeline.checks.homogeneity import OF_SCATTER
 from tankcal.pipeline.checks.stadia import check_bases
 from tankcal.pipeline.checks.survey import SHOWN, VAGUE, open_questions
 from tankcal.pipeline.table import check_table
-from tankcal.planning.entries import PLAN_FILE
+from tankcal.planning.contract import PLAN_FILE
 from tankcal.planning.measurements import measurements_of, nominal_of
 from tankcal.planning.model import Plan
 from tankcal.planning.reliability import assess_reliability

@@ -56,19 +56,23 @@ from tankcal.pipeline.checks.wall import ADVISED_POINTS, FEWEST_POINTS
 from tankcal.planning.assembly import assemble_plan, limits_of
 from tankcal.planning.contract import (
     JOB_TABLES,
+    PLAN_FILE,
     REPEATED,
     SINGLE,
     TABLES,
     WALL_SECTIONS,
     WALL_TABLES,
     Count,
+    Entry,
+    PlanInput,
+    check_form,
+    no_such_name,
 )
-from tankcal.planning.entries import PLAN_FILE, Entry, PlanInput, check_form, no_such_name
 from tankcal.planning.position_checks import check_positions
 from tankcal.planning.visibility import check_obstacles
 from tankcal.planning.wall.checks import check_sections
 from tankcal.planning.wall.reading import is_wall_plan, wall_plan_of
-from tankcal.text.numerals import NUMBER
+from tankcal.text.naming import NUMBER
 
 OF_LIQUID = ("horizontal", "sphere")  # kinds of tank that a plan may measure by liquid only
 # Placeholder of a table with one row, so that the checks of a job see a survey with readings.

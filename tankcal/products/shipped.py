@@ -16,7 +16,7 @@ class MainJob(Product):
     )
 
     def completions(self):
-        from tankcal.text.languages import LANGUAGES
+        from tankcal.text.shipped import LANGUAGES
 
         return {
             ("report", "--language"): (LANGUAGES, False),

@@ -22,7 +22,7 @@ import numpy as np
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.model.settings import Material
 from tankcal.messages import message
-from tankcal.recalibration.difference import adjust_difference, slopes_m2
+from tankcal.recalibration.agreement import adjust_difference, slopes_m2
 from tankcal.recalibration.upright_geometry import read_upright
 from tankcal.recalibration.upright_shell import Rings, estimate_radii
 from tankcal.record.comparison import BasisStep, ZeroShift

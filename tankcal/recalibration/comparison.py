@@ -15,6 +15,7 @@ from tankcal.job.rule_files import named_rule
 from tankcal.job.tables import Log
 from tankcal.messages import message
 from tankcal.recalibration.agreement import (
+    compare_courses,
     compare_deliveries,
     coverage_factor,
     critical_correlation,
@@ -24,7 +25,6 @@ from tankcal.recalibration.agreement import (
     normalized_error,
 )
 from tankcal.recalibration.basis import bring_to_one_basis, collect_facts, rounding_sd_m3
-from tankcal.recalibration.difference import compare_courses
 from tankcal.recalibration.former import read_courses
 from tankcal.recalibration.reading import read_former
 from tankcal.recalibration.verdict import (

@@ -17,7 +17,7 @@ from tankcal.recalibration.history import DatedTable, history_of
 from tankcal.recalibration.reading import read_former
 from tankcal.record.history import CheckInHistory, InspectionInHistory
 from tankcal.record.inspection import INSPECTION, VERDICTS
-from tankcal.text.decoding import decode_text, find_encoding
+from tankcal.text.delimited import decode_text, find_encoding
 
 RECORD = "record.json"
 MOST_NAMED = 10  # largest number of tanks listed in a message

@@ -7,12 +7,11 @@ import numpy as np
 from tankcal.errors import InputError, Problem, SolutionError, TankcalError
 from tankcal.job.tables import Log
 from tankcal.messages import message
-from tankcal.recalibration.computed_rows import find_computed_rows
 from tankcal.recalibration.former import read_courses
 from tankcal.recalibration.reading import read_former
 from tankcal.recalibration.seams import find_seams, find_seams_within
 from tankcal.recalibration.solid_geometry import fit_lying, fit_sphere
-from tankcal.recalibration.table_fit import row_sds
+from tankcal.recalibration.table_fit import find_computed_rows, row_sds
 from tankcal.recalibration.table_job import (
     make_record_job,
     make_solid_job,

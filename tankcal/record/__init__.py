@@ -12,7 +12,7 @@ from tankcal.record import manifest
 from tankcal.record.columns import whole
 from tankcal.record.long_tables import attach_tables, copy_record, omit_tables, split_tables
 from tankcal.record.versions import FORMAT, VERSION, migrated, version_of
-from tankcal.text.decoding import read_json
+from tankcal.text.delimited import read_json
 
 __all__ = [
     "FORMAT", "VERSION", "content_error", "copy_record", "load", "migrated", "read", "record_of",

@@ -17,7 +17,7 @@ from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml
 from tankcal.job.tables import Log, nearest, read_bytes
 from tankcal.messages import message
 from tankcal.report.logo import logo_problem
-from tankcal.text.decoding import read_json
+from tankcal.text.delimited import read_json
 
 LETTERHEAD_FILE = "letterhead.json"  # saved beside a notebook whose papers have a letterhead
 PLACE = "place"  # value of a mark that is an empty frame

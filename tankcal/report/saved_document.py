@@ -16,7 +16,7 @@ from tankcal.record import manifest, save
 from tankcal.record.saved_formats import SavedFormat
 from tankcal.record.schema import to_plain
 from tankcal.report import folders
-from tankcal.text.decoding import read_json
+from tankcal.text.delimited import read_json
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import re
 import numpy as np
 
 from tankcal.report.folders import refuse_foreign, replace_folder
-from tankcal.text.languages import DEFAULT
+from tankcal.text.shipped import DEFAULT
 from tankcal.text.words import load_words, say
 
 SETTINGS = "job.toml"

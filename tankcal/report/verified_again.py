@@ -12,7 +12,7 @@ from tankcal.record import manifest as manifests
 from tankcal.report.letterhead import LETTERHEAD_FILE, PLACE, Letterhead, Logo, read_saved
 from tankcal.report.paper_content import content_of_paper
 from tankcal.report.verified_files import compare_inputs
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 
 MOST_TOLD = 10  # largest number of reported numbers, and of texts, that differ
 

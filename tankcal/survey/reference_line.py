@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tankcal.geometry.form import harmonics
+from tankcal.geometry.outlines import harmonics
 from tankcal.messages import message
 from tankcal.units import ARCSEC as ARCSEC  # for callers, who state angles in arc seconds
 

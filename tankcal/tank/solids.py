@@ -26,8 +26,7 @@ import numpy as np
 
 from tankcal.errors import SolutionError
 from tankcal.messages import message
-from tankcal.tank.arcs import Cut, Line
-from tankcal.tank.heads import RADII, End
+from tankcal.tank.heads import RADII, Cut, End, Line
 from tankcal.tank.lying import (
     LyingSolid,
     Piece,

@@ -26,9 +26,8 @@ import numpy as np
 
 from tankcal.errors import HeightError, SolutionError
 from tankcal.messages import message
-from tankcal.tank.arcs import EllipseArc, revolved
 from tankcal.tank.body import ShellPart
-from tankcal.tank.heads import RADII, End, depth_of, meridian
+from tankcal.tank.heads import RADII, EllipseArc, End, depth_of, meridian, revolved
 from tankcal.tank.parts import Part, as_levels
 
 FORMS = {

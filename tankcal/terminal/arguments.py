@@ -4,8 +4,8 @@ import argparse
 
 from tankcal.messages import message
 from tankcal.terminal.showing import say_in_language
-from tankcal.text.languages import LANGUAGES
-from tankcal.text.numerals import NUMBER, WHOLE_NUMBER
+from tankcal.text.naming import NUMBER, WHOLE_NUMBER
+from tankcal.text.shipped import LANGUAGES
 
 MOST_WORKERS = 256  # on one machine
 LEAST_WORKER_GB = 0.5

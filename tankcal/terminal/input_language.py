@@ -10,8 +10,8 @@ from tankcal.job.tables import (
     Log,
     read_bytes,
 )
-from tankcal.text.decoding import read_json
-from tankcal.text.languages import DEFAULT, LANGUAGES, nearest_language
+from tankcal.text.delimited import read_json
+from tankcal.text.shipped import DEFAULT, LANGUAGES, nearest_language
 from tankcal.text.words import load_words
 
 
@@ -35,7 +35,7 @@ def read_job_language(path):
 
 def read_plan_language(path):
     """Return the language of a plan for `load_plan`, or None."""
-    from tankcal.planning.entries import PLAN_FILE
+    from tankcal.planning.contract import PLAN_FILE
 
     path = Path(path)
     try:

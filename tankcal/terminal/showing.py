@@ -15,7 +15,7 @@ from pathlib import Path
 
 from tankcal.errors import InputError, problem_of
 from tankcal.messages import Message, message, printable, printable_lines
-from tankcal.text.languages import DEFAULT, nearest_language
+from tankcal.text.shipped import DEFAULT, nearest_language
 from tankcal.text.time_left import describe_progress
 
 RECORD = "record.json"

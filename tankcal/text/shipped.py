@@ -1,6 +1,8 @@
-"""Locations of the shipped files: examples, documentation and report templates.
+"""Locations of the shipped files (examples, documentation, report templates), and languages.
 
 In a wheel these folders are inside the package, in a checkout beside it.
+
+Each language of the reports has a file in report_templates/words/.
 """
 
 from pathlib import Path
@@ -8,6 +10,8 @@ from pathlib import Path
 from tankcal.errors import TankcalError
 
 _PACKAGE = Path(__file__).resolve().parents[1]
+DEFAULT = "en"
+LANGUAGES = (DEFAULT, "pt-BR", "es")
 
 
 def shipped_folder(name):
@@ -24,3 +28,11 @@ def shipped_folder(name):
 def page_names():
     """Return the names of the pages of documentation in alphabetical order."""
     return tuple(sorted(path.stem for path in shipped_folder("docs").glob("*.md")))
+
+
+def nearest_language(given):
+    """Return the language for a code such as "pt", "pt_PT.UTF-8" or "ES"; None if unsupported."""
+    first = given.strip().lower()[:2] if isinstance(given, str) else ""
+    return next(
+        (language for language in LANGUAGES if first and language.lower()[:2] == first), None
+    )

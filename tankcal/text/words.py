@@ -13,8 +13,7 @@ from tankcal.errors import SHEET, TankcalError
 from tankcal.messages import as_plain, fill_template
 from tankcal.text.digits import NOTHING, Marks, fixed, shortest
 from tankcal.text.form_words import NOTES, word_of
-from tankcal.text.languages import DEFAULT
-from tankcal.text.shipped import shipped_folder
+from tankcal.text.shipped import DEFAULT, shipped_folder
 
 _TABLE = re.compile(r"^\[([^].]+)", re.MULTILINE)  # heading of a TOML table, with its group
 

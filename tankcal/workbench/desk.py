@@ -16,7 +16,7 @@ from tankcal.errors import InputError, TankcalError, reason_of
 from tankcal.job.contract import SURVEYS, TABLES_OF_KIND
 from tankcal.job.tables import REGISTERS, TABLES
 from tankcal.report.folders import default_folder
-from tankcal.text.languages import DEFAULT, nearest_language
+from tankcal.text.shipped import DEFAULT, nearest_language
 from tankcal.workbench.computing import Refusal, Run
 from tankcal.workbench.display import Reader
 from tankcal.workbench.draft import Draft

@@ -27,10 +27,16 @@ from tankcal.job.tables import (
     read_bytes,
 )
 from tankcal.messages import message
-from tankcal.text.decoding import WESTERN, decode_text, find_encoding, is_western
-from tankcal.workbench.book import new_sheet_table, read_book, write_book
+from tankcal.text.delimited import WESTERN, decode_text, find_encoding, is_western
 from tankcal.workbench.findings import Check, mark_cells
-from tankcal.workbench.keys import READ_ONLY_SECTIONS, SETTINGS, EditedKeys
+from tankcal.workbench.keys import (
+    READ_ONLY_SECTIONS,
+    SETTINGS,
+    EditedKeys,
+    new_sheet_table,
+    read_book,
+    write_book,
+)
 from tankcal.workbench.tables import new_csv_table, read_csv_table
 
 AMBIGUOUS = message(

@@ -16,7 +16,7 @@ from importlib.util import find_spec
 import tankcal
 from tankcal.errors import InputError, Problem, reason_of
 from tankcal.messages import message
-from tankcal.text.decoding import read_json
+from tankcal.text.delimited import read_json
 from tankcal.workbench.desk import open_job
 
 HERE = "127.0.0.1"  # address that only this machine can reach

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from tankcal.job.fields import Field
 from tankcal.job.folder import is_row, separator_of_text
 from tankcal.text.delimited import guard_formula, unguard_formula
-from tankcal.text.numerals import NUMBER
+from tankcal.text.naming import NUMBER
 
 _ENDING = re.compile("\r\n|\r|\n")
 MARK_OF_ORDER = "\N{ZERO WIDTH NO-BREAK SPACE}"  # byte order mark

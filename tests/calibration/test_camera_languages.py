@@ -22,8 +22,7 @@ from tankcal.report.camera.drawings import widen_to_decades
 from tankcal.report.camera.paper import shorten
 from tankcal.report.notebook import join_templates
 from tankcal.report.numbers import UNITS
-from tankcal.text.languages import DEFAULT, LANGUAGES
-from tankcal.text.shipped import shipped_folder
+from tankcal.text.shipped import DEFAULT, LANGUAGES, shipped_folder
 from tankcal.text.words import load_words
 
 pytest_plugins = ("camera_results",)

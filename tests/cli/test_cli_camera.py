@@ -14,8 +14,7 @@ from tankcal.camera.formats.published import convert_camera
 from tankcal.camera.model import Form
 from tankcal.cli import main
 from tankcal.record import load as load_record
-from tankcal.text.languages import LANGUAGES
-from tankcal.text.shipped import shipped_folder
+from tankcal.text.shipped import LANGUAGES, shipped_folder
 
 SEVEN = shipped_folder("examples") / "pessoa-2017" / "cameras.toml"
 PHOTOS = shipped_folder("examples") / "silva-1995-photos"

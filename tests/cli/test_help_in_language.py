@@ -11,7 +11,7 @@ import pytest
 
 from tankcal.cli import _parser, main, translate_parser
 from tankcal.terminal.showing import speak
-from tankcal.text.languages import DEFAULT, LANGUAGES
+from tankcal.text.shipped import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words
 
 OTHERS = [one for one in LANGUAGES if one != DEFAULT]

@@ -5,8 +5,8 @@ from fractions import Fraction
 import pytest
 
 from tankcal.errors import InputError
-from tankcal.exports.choosing import count_increments, to_quanta
 from tankcal.exports.profiles import find_profile, parse_profile, shipped_profiles
+from tankcal.exports.writing import count_increments, to_quanta
 from tankcal.job.tables import Log
 from tankcal.tank.dips import parse_dip
 

@@ -10,8 +10,7 @@ from scipy.interpolate import CubicSpline
 from shapes import azimuths, modes, ring
 
 from tankcal.errors import SolutionError
-from tankcal.geometry.form import HARMONICS, harmonics, mode_variances
-from tankcal.geometry.outlines import polar, smooth_outline
+from tankcal.geometry.outlines import HARMONICS, harmonics, mode_variances, polar, smooth_outline
 
 
 def smooth_level(xy_m, noise_m2, form_m2):

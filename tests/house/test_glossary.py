@@ -5,7 +5,7 @@ import re
 import pytest
 
 from tankcal.messages import fields_of
-from tankcal.text.languages import DEFAULT, LANGUAGES
+from tankcal.text.shipped import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words
 
 OTHERS = [one for one in LANGUAGES if one != DEFAULT]

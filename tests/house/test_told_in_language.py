@@ -19,7 +19,7 @@ from tankcal.record import record_of
 from tankcal.terminal.input_language import read_job_language
 from tankcal.terminal.showing import say_in_language, speak
 from tankcal.text.form_words import meant, word_of
-from tankcal.text.languages import nearest_language
+from tankcal.text.shipped import nearest_language
 from tankcal.text.words import load_words, translate_record
 
 OTHERS = ("pt-BR", "es")

@@ -10,7 +10,7 @@ from tankcal.cli import main
 from tankcal.errors import SolutionError
 from tankcal.intercomparison.answers import answer_package
 from tankcal.tank.capacity import Quantity
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 
 
 class Table:

@@ -15,7 +15,7 @@ from tankcal.job.starter import write_form, write_input_workbook, write_starter
 from tankcal.job.starter.form import Form
 from tankcal.report.folders import default_folder
 from tankcal.terminal.input_language import read_job_language
-from tankcal.text.languages import DEFAULT, LANGUAGES
+from tankcal.text.shipped import DEFAULT, LANGUAGES
 
 BLANKS = [
     *("tank.id", "tank.nominal_diameter_m", "tank.nominal_height_m", "survey.date"),

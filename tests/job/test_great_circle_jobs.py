@@ -12,7 +12,7 @@ from strapped_spheres import FOUR, TAPE, sphere_parts
 import tankcal
 from tankcal.errors import InputError
 from tankcal.job.starter import write_starter
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 
 FILE = "great_circles.csv"
 READING, USE = 3, 5

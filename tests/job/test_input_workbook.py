@@ -37,7 +37,7 @@ from tankcal.job.starter.form import STRAPPED, Form
 from tankcal.job.starter.texts import TABLE_NOTES, english_notes, split_unit, texts_in
 from tankcal.job.starter.validation import LONGEST_LIST, LONGEST_MESSAGE, LONGEST_TITLE, rule_of
 from tankcal.record import record_of
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import load_words
 
 FORMS = [

@@ -18,7 +18,7 @@ from tankcal.errors import InputError
 from tankcal.job.checks.sized_volumes import volume_by_sizes
 from tankcal.job.plausibility_table import TABLE
 from tankcal.job.starter import write_input_workbook
-from tankcal.text.languages import DEFAULT, LANGUAGES
+from tankcal.text.shipped import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words, say
 
 

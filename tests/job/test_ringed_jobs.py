@@ -13,7 +13,7 @@ from ringed_jobs import TAPE, ringed_parts
 import tankcal
 from tankcal.errors import InputError, TankcalError
 from tankcal.job.starter import write_input_workbook
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 
 
 def problems(folder, parts):

@@ -30,7 +30,7 @@ from tankcal.job.starter.form import OF_GREAT_CIRCLES, STRAPPED
 from tankcal.job.starter.page import filled_page
 from tankcal.job.tables import Log
 from tankcal.tank.rules import TANKS
-from tankcal.text.languages import DEFAULT, LANGUAGES
+from tankcal.text.shipped import DEFAULT, LANGUAGES
 
 OTHERS = [one for one in LANGUAGES if one != DEFAULT]
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "job-format.md"

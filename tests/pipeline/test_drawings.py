@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from tankcal.pipeline.plots.figures import bottom_rows, capacity_curves
 from tankcal.pipeline.plots.style import STYLE
-from tankcal.text.labels import Label, write_labels
+from tankcal.report.survey.figures import Label, write_labels
 
 
 def written(count, radius=1.0, text="1-{0:02d}, 2-{0:02d}, 3-{0:02d}, 4-{0:02d}, +4"):

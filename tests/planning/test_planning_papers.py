@@ -25,7 +25,7 @@ from tankcal.report.planning.field_sheets import sheets
 from tankcal.report.planning.outlook import outlook
 from tankcal.report.planning.paper import PlanPaper
 from tankcal.report.planning.rows import field_tables
-from tankcal.text.languages import DEFAULT, LANGUAGES
+from tankcal.text.shipped import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words
 
 NO_TEXT = {"kind", "align", "language", "decimal_mark", "part", "svg", "date"}

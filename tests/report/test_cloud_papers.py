@@ -19,7 +19,7 @@ from tankcal.report.plain import PlainPaper
 from tankcal.report.tables import clouds
 from tankcal.report.web import page
 from tankcal.tank.capacity import Capacity, Source
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import load_words, translate_record
 
 # ---- U with and without the shared part

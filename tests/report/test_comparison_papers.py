@@ -28,7 +28,7 @@ from tankcal.report.comparison.tables import (
     worst_row,
 )
 from tankcal.report.comparison.workbook import write
-from tankcal.text.languages import DEFAULT, LANGUAGES
+from tankcal.text.shipped import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words
 
 PROGRAM = {"tankcal", "comparison", "mm", "xlsx"}  # and units

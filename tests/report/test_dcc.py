@@ -13,7 +13,7 @@ from workbook_records import KINDS, read_records, write_records_of_every_kind
 
 from tankcal.report import dcc
 from tankcal.report.attachments import sha256
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import load_words
 
 NAMES = {"dcc": DCC, "si": SI}

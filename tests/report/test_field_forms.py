@@ -17,7 +17,7 @@ from tankcal.report.field_forms import (
     sheets,
     write_field_sheets,
 )
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 
 OF_THE_OFFICE = ("control",)  # known beforehand
 LEAST_WORDS = 20  # of a page that has a form: head, foot and the line to sign on are fewer

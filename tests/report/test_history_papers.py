@@ -16,7 +16,7 @@ from tankcal.report.history.figures import limited_checks
 from tankcal.report.history.pages import MOST_ROWS, pages
 from tankcal.report.history.tables import check_rows, radius_rows, volume_rows
 from tankcal.report.verification import verify
-from tankcal.text.languages import DEFAULT, LANGUAGES
+from tankcal.text.shipped import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words
 
 KINDS = {"plain": plain, "single": single, "hostile": hostile}

@@ -7,7 +7,7 @@ from paper_words import assert_tables_have_words, cells_of_sheet, instruments_sa
 import tankcal
 from tankcal.methods.hits import tables as hits
 from tankcal.record import record_of
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 
 SLOW_FIXTURES = {"result", "record"}  # seconds each
 

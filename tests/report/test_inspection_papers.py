@@ -43,7 +43,7 @@ from tankcal.report.inspection.pages import (
 )
 from tankcal.report.inspection.wall import courses, departures, levels, welds
 from tankcal.report.pdf import pdf
-from tankcal.text.languages import DEFAULT, LANGUAGES
+from tankcal.text.shipped import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words
 
 pytestmark = pytest.mark.slow  # seconds of runs and papers

@@ -23,7 +23,7 @@ from tankcal.report.plain import PlainPaper
 from tankcal.report.tables import liquid
 from tankcal.report.tables.facts import CERTIFICATE, SURVEY
 from tankcal.report.web.tank_shape import tank_view
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import load_words, translate_record
 
 pytestmark = pytest.mark.slow  # seconds of runs and papers

@@ -14,7 +14,7 @@ from tankcal.record.versions import FORMAT
 from tankcal.report.paper import Paper
 from tankcal.report.papers import parts_without_content
 from tankcal.report.tables.overrulings import OVERRULINGS, sentences
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 
 TURN = np.radians(7.5)
 DENT = ("dent", 6.46 * np.sin(TURN), 6.46 * np.cos(TURN), 5.225)

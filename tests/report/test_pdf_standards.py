@@ -14,7 +14,7 @@ from tankcal.report import planning as planning_papers
 from tankcal.report.comparison import write_comparison
 from tankcal.report.letterhead import load
 from tankcal.report.papers import build
-from tankcal.text.languages import DEFAULT, LANGUAGES
+from tankcal.text.shipped import DEFAULT, LANGUAGES
 
 FLAVOURS = ("3a", "ua1")
 LOGO = (

@@ -15,7 +15,7 @@ from tankcal.report.pdf import pdf
 from tankcal.report.plain import Column, PlainPaper
 from tankcal.report.plain_formulas import formula_nodes
 from tankcal.report.web import block_html
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import load_words
 
 SIGNS = set("√π²αρΔ−_")  # signs of mathematics, none of which stays in the words around it

@@ -5,7 +5,7 @@ from calculated_tanks import afloat, example_with_rows
 from recalculation import recalculated, without_results
 
 from tankcal.report.workbook import write
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import load_words
 
 # openpyxl does not know our data bars, and says so each time

@@ -11,7 +11,7 @@ from paper_pages import filled, lone_headings, pages_of, sparse_pages
 from tankcal.report import blocks
 from tankcal.report.papers import build
 from tankcal.report.pdf import pdf, prepare_table
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import load_words
 
 SQUARE = (

@@ -15,7 +15,7 @@ from tankcal.report import ship
 from tankcal.report.outputs.tables import write_tables
 from tankcal.report.plain import PlainPaper
 from tankcal.report.tables import ship as tables
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import load_words, translate_record
 
 EXAMPLE = Path("examples/ship")

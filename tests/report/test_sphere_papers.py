@@ -14,7 +14,7 @@ from tankcal.report.outputs import write
 from tankcal.report.outputs.tables import write_tables
 from tankcal.report.paper import Paper
 from tankcal.report.tables.facts import REFERENCES
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 
 STEPS = ("certificate", "temperature", "tension", "tape_thickness", "rise", "sag")
 

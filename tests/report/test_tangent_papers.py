@@ -9,7 +9,7 @@ from paper_words import assert_tables_have_words, cells_of_sheet, instruments_sa
 import tankcal
 from tankcal.methods.tangents import tables as tangents
 from tankcal.record import record_of
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 
 EXAMPLE = Path("examples/tangents")
 

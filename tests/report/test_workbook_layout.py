@@ -11,7 +11,7 @@ from workbook_records import KINDS
 
 from tankcal.report import workbook
 from tankcal.report.workbook.look import lines_of, pieces_of
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import load_words
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*extension is not supported:UserWarning")

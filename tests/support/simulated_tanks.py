@@ -15,7 +15,7 @@ from job_builder import write_job
 from shapes import azimuths, ring
 
 import tankcal
-from tankcal.geometry.form import harmonics
+from tankcal.geometry.outlines import harmonics
 from tankcal.job.model import DeclaredInput
 from tankcal.pipeline.tanks import body_of, zero_height
 from tankcal.pipeline.wall.finding import find_wall, fit_wall

@@ -11,7 +11,7 @@ from jacobians import assert_derivative
 
 from tankcal.errors import HeightError, SolutionError
 from tankcal.tank.heads import End
-from tankcal.tank.rings import WAVES, RingedTank
+from tankcal.tank.lying import WAVES, RingedTank
 from tankcal.tank.solids import LyingTank
 
 LAPPED = RingedTank((1.200, 1.192, 1.200), (3.0, 3.0, 3.0), tilt=0.010, dip_from_a_m=1.5)

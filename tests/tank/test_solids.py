@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from jacobians import assert_derivative
 
 from tankcal.errors import HeightError, SolutionError
-from tankcal.tank.arcs import Cut, integrate
-from tankcal.tank.heads import KINDS, End, depth_of, meridian
+from tankcal.tank.heads import KINDS, Cut, End, depth_of, integrate, meridian
 from tankcal.tank.solids import FLAT, LyingTank, Sphere
 
 INCH = 0.0254

@@ -8,7 +8,7 @@ from conftest import EXAMPLE
 
 import tankcal
 from tankcal.cli import main
-from tankcal.text.decoding import decode_text, find_encoding, read_json
+from tankcal.text.delimited import decode_text, find_encoding, read_json
 from tankcal.workbench.draft import Draft
 
 FORMER = """

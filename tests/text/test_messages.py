@@ -26,7 +26,7 @@ from tankcal.messages import (
 )
 from tankcal.record import record_of
 from tankcal.record.schema import to_plain
-from tankcal.text.languages import DEFAULT, LANGUAGES
+from tankcal.text.shipped import DEFAULT, LANGUAGES
 from tankcal.text.words import MESSAGES, load_words, message_sentence, translate_record
 
 SOURCE = Path(tankcal.__file__).parent

@@ -10,7 +10,7 @@ from job_builder import write_job, write_workbook
 import tankcal
 from tankcal.job.fields import Field
 from tankcal.job.tables import REGISTERS, TABLES
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 from tankcal.workbench import Refusal, desk, open_job
 from tankcal.workbench.computing import Run, Stopped
 from tankcal.workbench.desk import Desk

@@ -14,7 +14,7 @@ from nbclient.exceptions import CellExecutionError
 
 import tankcal
 from tankcal.cli import main
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 from tankcal.workbench.serving import make_notebook
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

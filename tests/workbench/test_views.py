@@ -16,7 +16,7 @@ from tankcal.messages import message
 from tankcal.record import record_of
 from tankcal.report.paper import Paper
 from tankcal.report.tables.capacity import capacity_rows, capacity_table
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 from tankcal.workbench.views import page as pages
 from tankcal.workbench.views import results_view
 from tankcal.workbench.views.calculator import Calculator, parse_number
@@ -238,7 +238,7 @@ def heard():
 
 @pytest.fixture
 def points(widgets, english, heard):
-    from tankcal.workbench.views.points import PointsPanel
+    from tankcal.workbench.views.panels import PointsPanel
 
     return PointsPanel(english, lambda *given: heard.append(given))
 
@@ -282,7 +282,7 @@ def test_nothing_is_decided_about_nothing(points):
 
 
 def test_a_refusal_is_said(widgets, english):
-    from tankcal.workbench.views.points import PointsPanel
+    from tankcal.workbench.views.panels import PointsPanel
 
     def refuse(*_given):
         raise InputError(Problem("overrulings.csv", message("overruled_nothing", "blank <b>")))
@@ -295,7 +295,7 @@ def test_a_refusal_is_said(widgets, english):
 
 
 def test_nobody_decides_where_nobody_listens(widgets, english):
-    from tankcal.workbench.views.points import PointsPanel
+    from tankcal.workbench.views.panels import PointsPanel
 
     panel = PointsPanel(english, None)
     assert panel.reason not in panel.box.children

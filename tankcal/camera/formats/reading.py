@@ -17,7 +17,7 @@ from tankcal.camera.formats import balanced, colmap, metashape, opencv, pix4d
 from tankcal.camera.formats.texts import LONGEST, Notes, make_valid_name, short_text
 from tankcal.errors import SolutionError, reason_of
 from tankcal.messages import message
-from tankcal.text.decoding import decode_text
+from tankcal.text.delimited import decode_text
 
 SAME_PIXEL = 0.01  # relative tolerance between the pixel in the file and the given pixel
 PIXELS_UM = (0.1, 100.0)  # range of pixels of cameras and scanners

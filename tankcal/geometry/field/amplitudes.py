@@ -27,7 +27,7 @@ from tankcal.geometry.field.components import (
 )
 from tankcal.geometry.field.likelihood import LEAST_M, LEAST_NOISE_M, Likelihood, Part, prior_of
 from tankcal.geometry.field.sites import free_design
-from tankcal.geometry.form import multiples
+from tankcal.geometry.outlines import multiples
 from tankcal.units import FULL_TURN
 
 SMALLEST = 1e-8  # keeps the remainder of a covariance without its modelled part positive

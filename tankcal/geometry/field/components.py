@@ -32,7 +32,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tankcal.geometry.form import multiples
+from tankcal.geometry.outlines import multiples
 from tankcal.units import FULL_TURN
 
 OVALITY_MODES = np.arange(2.0, 37.0)

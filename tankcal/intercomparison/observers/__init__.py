@@ -10,9 +10,8 @@ so that an error there does not affect the true values.
 from tankcal.intercomparison.observers.cloud import observe_cloud
 from tankcal.intercomparison.observers.liquid import observe_liquid
 from tankcal.intercomparison.observers.photographs import observe_photographs
-from tankcal.intercomparison.observers.points import observe_points
 from tankcal.intercomparison.observers.tape import observe_lines, observe_tape
-from tankcal.intercomparison.observers.total_station import observe_hits
+from tankcal.intercomparison.observers.total_station import observe_hits, observe_points
 
 METHODS = {
     "points": observe_points,

@@ -4,7 +4,7 @@ from tankcal.job.contract.kinds import KINDS, LOADED, VERTICAL, WITH_POINTS
 from tankcal.job.contract.registers import CAMERA_SETTINGS
 from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.fields import Field
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 
 SPHERE = ("sphere",)
 MOST_BAR = 50  # largest gauge pressure of a sphere, bar

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tankcal.text.languages import DEFAULT
+from tankcal.text.shipped import DEFAULT
 
 # Declared inputs of uncertainty and volumes to be reported.
 

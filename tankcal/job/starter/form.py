@@ -16,7 +16,7 @@ from tankcal.job.contract import (
 from tankcal.job.contract.uncertainty import UNITS
 from tankcal.job.fields import Field
 from tankcal.methods.base import methods, methods_for
-from tankcal.text.languages import DEFAULT, LANGUAGES
+from tankcal.text.shipped import DEFAULT, LANGUAGES
 
 STRAPPED = ("strapping", "reference-line")  # surveys without an adjustment of points
 # Surveys for vertical tanks; for other kinds see SURVEYS_OF_KIND.

@@ -11,10 +11,8 @@ from tankcal.job.fields import MAX_TEXT
 from tankcal.methods.base import methods
 from tankcal.text.digits import shortest
 from tankcal.text.form_words import word_of
-from tankcal.text.languages import DEFAULT
-from tankcal.text.naming import MAX_NAME
-from tankcal.text.numerals import NUMBER
-from tankcal.text.unit_endings import split_unit
+from tankcal.text.naming import MAX_NAME, NUMBER, split_unit
+from tankcal.text.shipped import DEFAULT
 from tankcal.text.words import load_words, marks_of
 
 

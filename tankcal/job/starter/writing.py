@@ -15,7 +15,7 @@ from tankcal.job.starter.texts import is_number, texts_in
 from tankcal.job.tables import SETTINGS_FILE, WORKBOOK_FILE
 from tankcal.messages import message
 from tankcal.text.delimited import write_guarded
-from tankcal.text.languages import DEFAULT
+from tankcal.text.shipped import DEFAULT
 from tankcal.text.words import say
 
 KEPT = ("field-sheets.pdf",)  # files that may exist in the folder of a new form

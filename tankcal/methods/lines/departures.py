@@ -7,7 +7,7 @@ changes all readings of a line, or of all lines. The test of single readings can
 import numpy as np
 
 from tankcal.errors import Problem
-from tankcal.geometry.form import harmonics
+from tankcal.geometry.outlines import harmonics
 from tankcal.messages import message
 from tankcal.pipeline.checks.survey_limits import limits_of
 from tankcal.survey.reference_line import rises_of

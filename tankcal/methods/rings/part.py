@@ -2,7 +2,7 @@
 
 from tankcal.pipeline.tanks.common import inside_end, is_warmed, thermal_scale
 from tankcal.tank.body import SolidPart
-from tankcal.tank.rings import RingedTank
+from tankcal.tank.lying import RingedTank
 
 SURVEYED = ("ring_radii", "dip_radius", "ring_waves")
 

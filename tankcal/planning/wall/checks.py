@@ -8,7 +8,7 @@ import numpy as np
 from tankcal.errors import Problem
 from tankcal.job.tables import Log
 from tankcal.messages import list_some, message
-from tankcal.planning.entries import PLAN_FILE, check_form, no_such_name, too_many_sections
+from tankcal.planning.contract import PLAN_FILE, check_form, no_such_name, too_many_sections
 from tankcal.planning.visibility import (
     check_obstacles,
     message_of_cut_line,

@@ -9,8 +9,7 @@ from tankcal.job.checking import zero_z
 from tankcal.job.checks.sized_volumes import volume_by_sizes
 from tankcal.job.checks.survey.stadia import is_bar
 from tankcal.job.tables import SETTINGS_FILE, Log, Value
-from tankcal.planning.contract import MEASURING
-from tankcal.planning.entries import PLAN_FILE, forms_m
+from tankcal.planning.contract import MEASURING, PLAN_FILE, forms_m
 from tankcal.planning.visibility import obstacles_of
 from tankcal.planning.wall.checks import percents_of, refuse_cut, warnings_of_obstacles
 from tankcal.planning.wall.design_tables import DesignTables

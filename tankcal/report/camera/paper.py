@@ -9,9 +9,9 @@ from tankcal.messages import message
 from tankcal.record.camera_versions import CAMERA
 from tankcal.report import blocks
 from tankcal.report.plain import Column, PlainPaper
-from tankcal.text.decoding import read_json
+from tankcal.text.delimited import read_json
 from tankcal.text.digits import NOTHING
-from tankcal.text.languages import DEFAULT
+from tankcal.text.shipped import DEFAULT
 from tankcal.text.words import load_words
 
 LONGEST_NAME = 24  # characters of a name in a table

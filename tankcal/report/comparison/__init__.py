@@ -14,7 +14,7 @@ from tankcal.report.plain import words_with_part
 from tankcal.report.saved_document import SavedDocument
 from tankcal.report.saved_paper import SavedPaper, bearable, iso_day, signed_text
 from tankcal.text.digits import LITRE_DECIMALS, NOTHING
-from tankcal.text.languages import DEFAULT
+from tankcal.text.shipped import DEFAULT
 from tankcal.text.words import load_words
 
 __all__ = [

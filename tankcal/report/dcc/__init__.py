@@ -14,7 +14,7 @@ from tankcal.report.dcc.elements import (
     serialize,
 )
 from tankcal.report.dcc.measured import add_results
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import language_of, load_words
 
 __all__ = ["DCC", "FILE", "certificate_xml", "language_with"]

@@ -18,7 +18,7 @@ from tankcal.report.history.tables import (
 from tankcal.report.plain import words_with_part
 from tankcal.report.saved_document import SavedDocument
 from tankcal.report.saved_paper import SavedPaper, bearable
-from tankcal.text.languages import DEFAULT
+from tankcal.text.shipped import DEFAULT
 from tankcal.text.words import load_words
 
 __all__ = [*("DOCUMENT", "FILES", "HistoryPaper", "rebuild", "refuse_foreign"), "write_history"]

@@ -7,7 +7,7 @@ from tankcal.record.inspection import INSPECTION
 from tankcal.report.plain import words_with_part
 from tankcal.report.saved_paper import SavedPaper, bearable, iso_day, signed_text
 from tankcal.text.digits import NOTHING, fixed, shortest
-from tankcal.text.languages import DEFAULT
+from tankcal.text.shipped import DEFAULT
 from tankcal.text.words import load_words
 
 FILE = INSPECTION.file

@@ -18,7 +18,7 @@ from tankcal.report.letterhead import LETTERHEAD_FILE
 from tankcal.report.outputs import tables
 from tankcal.report.papers import FILES as PAPER_FILES
 from tankcal.report.papers import build
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 
 if TYPE_CHECKING:
     from tankcal.pipeline.result import Result

@@ -13,8 +13,8 @@ from tankcal.planning.measurements import targets_of
 from tankcal.planning.model import TAPED
 from tankcal.planning.wall.reading import datum_of, tables_of
 from tankcal.record.plan import PLAN, WALL_PLAN
-from tankcal.text.decoding import read_json
-from tankcal.text.languages import DEFAULT
+from tankcal.text.delimited import read_json
+from tankcal.text.shipped import DEFAULT
 from tankcal.units import ARCSEC_PER_DEG
 
 MEASURED = (

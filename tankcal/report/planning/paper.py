@@ -9,7 +9,7 @@ from tankcal.record.schema import to_plain
 from tankcal.report import blocks
 from tankcal.report.plain import PlainPaper, words_with_part
 from tankcal.report.planning.rows import find_by_name
-from tankcal.text.languages import DEFAULT
+from tankcal.text.shipped import DEFAULT
 from tankcal.text.words import load_words, message_sentence
 
 DESIGN = "design"  # folder of the documents of the smallest design

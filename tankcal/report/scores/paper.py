@@ -4,7 +4,7 @@ from tankcal.record.intercomparison import SCORES
 from tankcal.report.plain import words_with_part
 from tankcal.report.saved_paper import SavedPaper, bearable, iso_day
 from tankcal.text.digits import fixed
-from tankcal.text.languages import DEFAULT
+from tankcal.text.shipped import DEFAULT
 from tankcal.text.words import load_words
 
 FILE, WORKBOOK, PAGE = SCORES.file, "scores.xlsx", "scores.html"

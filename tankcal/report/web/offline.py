@@ -11,8 +11,7 @@ from html import escape
 
 from tankcal.report.web.elements import PIECE, block_html, frame_table, searchable_table
 from tankcal.report.web.packing import script_data
-from tankcal.text.languages import DEFAULT, LANGUAGES
-from tankcal.text.shipped import shipped_folder
+from tankcal.text.shipped import DEFAULT, LANGUAGES, shipped_folder
 from tankcal.text.words import load_words
 
 _SCRIPTS = {  # scripts of each kind of block; "": scripts of every page

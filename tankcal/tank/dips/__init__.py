@@ -8,13 +8,22 @@ reading       ullage, and the dip of a volume
 """
 
 from tankcal.tank.dips.rows import (
+    HEIGHT_STEPS_M,
+    INCHES_PER_FOOT,
+    METRES_PER_INCH,
     MOST_ROWS,
+    TABLE_DECIMALS,
+    VOLUME_UNITS_M3,
     Dips,
+    dip_label,
     dips_of,
+    parse_dip,
     round_each,
     table_heights,
     top_mark,
     ullage_m,
+    volume_from_m3,
+    volume_to_m3,
 )
 from tankcal.tank.dips.straightness import (
     LADDERS_M,
@@ -24,17 +33,6 @@ from tankcal.tank.dips.straightness import (
     choose_rows,
     interpolation_errors,
     proportional_parts,
-)
-from tankcal.tank.dips.units import (
-    HEIGHT_STEPS_M,
-    INCHES_PER_FOOT,
-    METRES_PER_INCH,
-    TABLE_DECIMALS,
-    VOLUME_UNITS_M3,
-    dip_label,
-    parse_dip,
-    volume_from_m3,
-    volume_to_m3,
 )
 
 __all__ = [

@@ -24,8 +24,7 @@ from itertools import pairwise
 import numpy as np
 
 from tankcal.errors import HeightError, InputError, Problem
-from tankcal.tank.dips.rows import MOST_ROWS, multiples_of, table_heights
-from tankcal.tank.dips.units import METRES_PER_INCH
+from tankcal.tank.dips.rows import METRES_PER_INCH, MOST_ROWS, multiples_of, table_heights
 
 METRIC_STEPS_M = (0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001)
 INCH_STEPS_M = tuple(float(METRES_PER_INCH / part) for part in (1, 2, 4, 8, 16))
