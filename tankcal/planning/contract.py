@@ -1,5 +1,4 @@
-"""Keys of plan.toml, and sections and tables of a plan that a job does not have.
-"""
+"""Keys of plan.toml, and sections and tables of a plan that a job does not have."""
 
 from dataclasses import dataclass
 

@@ -22,7 +22,7 @@ from tankcal.report.ticket import TicketPaper, write_ticket
 from tankcal.report.ticket.pages import comparison_text
 from tankcal.report.verification import verify
 from tankcal.tank.fittings import floating_roof
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import load_words
 
 TOML = """

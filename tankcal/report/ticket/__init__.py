@@ -12,7 +12,7 @@ from tankcal.report.plain import words_with_part
 from tankcal.report.saved_document import SavedDocument
 from tankcal.report.saved_paper import SavedPaper, bearable
 from tankcal.report.ticket.tables import BUDGET, QUANTITIES, STEPS, UNCERTAINTIES
-from tankcal.text.languages import DEFAULT
+from tankcal.text.shipped import DEFAULT
 from tankcal.text.words import load_words, message_sentence
 
 __all__ = ["DOCUMENT", "FILES", "TicketPaper", "rebuild", "refuse_foreign", "write_ticket"]

@@ -27,7 +27,7 @@ from tankcal.report.dcc.elements import (
 )
 from tankcal.report.ticket.pages import comparison_text, notes, warnings_text
 from tankcal.report.ticket.tables import QUANTITY_UNITS, source_of
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 
 _UNITS = {"m3": CUBIC_METRE, "kg": KILOGRAM, "kg/m3": DENSITY, "degC": CELSIUS, "": ONE}
 _READINGS = {"level_m": METRE, "water_dip_m": METRE, "temperature_c": CELSIUS,

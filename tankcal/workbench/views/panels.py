@@ -1,5 +1,4 @@
-"""Widgets of a result: table and calculators, wall with rejected points, budget.
-"""
+"""Widgets of a result: table and calculators, wall with rejected points, budget."""
 
 from html import escape
 from importlib.util import find_spec
