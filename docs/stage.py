@@ -40,7 +40,6 @@ REFERENCE = {  # {title: modules of a page of the reference}, in the order of th
             "cylinders",
             "primitives",
             "outlines",
-            "form",
             "field.components",
             "field.amplitudes",
             "field.estimate",
