@@ -14,7 +14,7 @@ from tankcal.products.quantity.starter import SECTIONS, starter_text, write_star
 from tankcal.products.quantity.table import TankTable
 from tankcal.tank.volume_correction.factors import FactorTable
 from tankcal.tank.volume_correction.petroleum import Petroleum
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import load_words
 
 M3_PER_M = 131.0

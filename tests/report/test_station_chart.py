@@ -11,7 +11,7 @@ from calculated_tanks import afloat, example_with_rows
 from tankcal.cli import main
 from tankcal.report.pdf import pdf
 from tankcal.report.station_chart import MOST_ROWS, chart_rows, layout, pages
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 
 READABLE_PT = 7.0  # smallest type of a chart with the most rows
 
