@@ -18,9 +18,17 @@ USUAL = {  # usual headings, by the name of the column without its unit
     "point": (
         *("point", "point name", "point id", "point number", "name", "id", "no", "number", "pt"),
         *("ponto", "nome", "nome do ponto", "numero", "punto", "nombre", "nombre del punto", "pto"),
+        *("no do ponto", "n° do ponto", "numero do ponto", "no de punto", "n° de punto", "n°"),
+        *("numero de punto", "numero del punto", "vertex", "vertice"),
     ),
-    "x": ("x", "coord x", "coordenada x", "coordinate x", "e", "east", "easting", "este", "leste"),
-    "y": ("y", "coord y", "coordenada y", "coordinate y", "n", "north", "northing", "norte"),
+    "x": (
+        *("x", "coord x", "coordenada x", "coordinate x", "e", "east", "easting", "este", "leste"),
+        *("coord e", "coord este", "coordenada este", "coord leste", "coordenada leste"),
+    ),
+    "y": (
+        *("y", "coord y", "coordenada y", "coordinate y", "n", "north", "northing", "norte"),
+        *("coord n", "coord norte", "coordenada norte"),
+    ),
     "z": (
         *("z", "coord z", "coordenada z", "coordinate z", "h", "height", "elevation", "elev"),
         *("altitude", "cota", "altura", "elevacao", "elevacion", "altitud"),

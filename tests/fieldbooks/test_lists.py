@@ -171,6 +171,11 @@ def test_a_heading_in_another_unit_is_refused(job):
         ("points", "Std dev y (mm)", "sy_mm"),
         ("points", "Desvio (mm)", None),  # of which coordinate?
         ("points", "Diâmetro", None),
+        ("points", "Vértice", "point"),
+        ("points", "N° do ponto", "point"),
+        ("points", "Nº de punto", "point"),
+        ("points", "Coord. Este (m)", "x_m"),
+        ("points", "Coordenada Norte", "y_m"),
     ],
 )
 def test_headings_mean_columns(table, heading, column):
