@@ -53,7 +53,8 @@ def compare_pdf(verification, path):
     try:
         reader = pypdf.PdfReader(io.BytesIO(path.read_bytes()))
         keywords = str((reader.metadata or {}).get("/Keywords", ""))
-        embedded = {file: bytes(parts[-1]) for file, parts in reader.attachments.items()}
+        # pathlib does not accept subclasses of str, such as the names that pypdf returns
+        embedded = {str(file): bytes(parts[-1]) for file, parts in reader.attachments.items()}
     except Exception as error:  # a broken file can raise any exception
         verification.tell(
             name,
