@@ -4,8 +4,11 @@ The bytes of a paper depend on the packages that wrote it. Its numbers depend on
 words depend on the record and on the version of tankcal.
 """
 
+import html
 import io
 import re
+import warnings
+import zipfile
 from collections import Counter
 from dataclasses import dataclass
 from html.parser import HTMLParser
@@ -14,16 +17,34 @@ from pathlib import PurePath
 NUMBER = re.compile(r"(?<![\w.,])\d[\d.,]*")
 WORD = re.compile(r"[^\W\d_]{2,}")
 PICTURE = re.compile(r"[A-Za-z0-9+/=\\n]{200,}")  # base64
+# Parts of a page that show something other than its text.
+_SHOWING_TAGS = frozenset(("applet", "base", "embed", "frame", "iframe", "link", "object"))
+_SHOWING_PART = re.compile(
+    r"xl/(?:comments|threadedComments|externalLinks|embeddings|activeX|vba).*"
+)
+_TEXT_OF_STYLE = re.compile(r"content\s*:\s*([\"'][^\"']*\w[^\"']*[\"'])")
+_FORMAT_OF_CELLS = re.compile(r'formatCode="([^"]*)"')
+_PRINTED_DIGITS = re.compile(r'"[^"]*\d[^"]*"|\\\d')  # digits that a cell shows for any number
 DIGITS = 5  # numbers with at least so many digits do not agree by chance
 
 
 @dataclass(frozen=True)
 class PaperContent:
-    """Numbers and words of a paper in their printed order and form."""
+    """Numbers and words of a paper in their printed order and form.
+
+    Attributes
+    ----------
+    numbers, words : list of str
+    is_paged : bool
+        Whether line and page breaks can change the order.
+    elements : frozenset of str
+        Parts that can cover or replace the text on the screen, such as annotations and scripts.
+    """
 
     numbers: list[str]
     words: list[str]
     is_paged: bool
+    elements: frozenset[str] = frozenset()
 
     def missing_in(self, other, *, same_version):
         """Return the words and numbers of this paper that `other` lacks (list of str).
@@ -84,15 +105,17 @@ def content_of_paper(name, content, ignored=()):
     >>> content_of_paper("a.csv", b"height_m,volume_m3\\n1.00,132.47\\n").numbers
     ['1.00', '132.47']
     """
-    read = _READERS.get(PurePath(name).suffix, _plain)
+    suffix = PurePath(name).suffix
+    read = _READERS.get(suffix, _plain)
     try:
         text = read(content)
+        elements = frozenset(_ELEMENTS[suffix](content)) if suffix in _ELEMENTS else frozenset()
     except Exception as error:  # a broken file can raise any exception
         raise ValueError(f"{name}: {type(error).__name__}") from error
     for word in sorted(ignored, key=len, reverse=True):
         text = text.replace(word, " ")
     numbers = [number.rstrip(".,") for number in NUMBER.findall(text)]
-    return PaperContent(numbers, WORD.findall(text), PurePath(name).suffix == ".pdf")
+    return PaperContent(numbers, WORD.findall(text), suffix == ".pdf", elements)
 
 
 def _plain(content):
@@ -114,7 +137,13 @@ def _read_pdf(content):
 def _read_workbook(content):
     import openpyxl
 
-    book = openpyxl.load_workbook(io.BytesIO(content), read_only=True)
+    with warnings.catch_warnings():  # charts and formats are not read
+        warnings.simplefilter("ignore")
+        book = openpyxl.load_workbook(io.BytesIO(content), read_only=True)
+        return _texts_of_cells(book)
+
+
+def _texts_of_cells(book):
     cells = (
         cell
         for sheet in book.worksheets
@@ -137,10 +166,14 @@ class _Text(HTMLParser):
 
     def __init__(self):
         super().__init__()
-        self.parts, self._depth = [], 0
+        self.parts, self.elements, self._depth = [], set(), 0
 
     def handle_starttag(self, tag, attrs):
         self._depth += tag == "svg"
+        names = {name for name, _ in attrs}
+        if tag in _SHOWING_TAGS or (tag == "meta" and "http-equiv" in names):
+            self.elements.add(f"<{tag}>")
+        self.elements.update(name for name in names if name.startswith("on"))
 
     def handle_endtag(self, tag):
         self._depth -= tag == "svg"
@@ -150,4 +183,37 @@ class _Text(HTMLParser):
             self.parts.append(data)
 
 
+def _elements_of_page(content):
+    text = _plain(content)
+    reader = _Text()
+    reader.feed(text)
+    reader.close()
+    return reader.elements | set(_TEXT_OF_STYLE.findall(text))
+
+
+def _elements_of_pdf(content):
+    import pypdf
+
+    reader = pypdf.PdfReader(io.BytesIO(content))
+    root = reader.trailer["/Root"]
+    yield from (key for key in ("/OpenAction", "/AA") if key in root)
+    yield from (key for key in ("/JavaScript",) if key in root.get("/Names", {}))
+    for page in reader.pages:
+        for annotation in page.get("/Annots") or ():
+            kind = annotation.get_object().get("/Subtype", "")
+            if kind not in ("/Link", "/Widget"):
+                yield kind
+
+
+def _elements_of_workbook(content):
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        yield from filter(_SHOWING_PART.fullmatch, archive.namelist())
+        styles = archive.read("xl/styles.xml").decode("utf-8", "replace")
+    for code in map(html.unescape, _FORMAT_OF_CELLS.findall(styles)):
+        yield from _PRINTED_DIGITS.findall(code)
+
+
 _READERS = {".csv": _read_csv, ".pdf": _read_pdf, ".xlsx": _read_workbook, ".html": _read_page}
+_ELEMENTS = {
+    ".pdf": _elements_of_pdf, ".xlsx": _elements_of_workbook, ".html": _elements_of_page
+}  # fmt: skip

@@ -174,6 +174,19 @@ def _compare_content(verification, name, path, new_path, made_by):
             name, message("verify_unreadable", "cannot be read; expected a file of tankcal")
         )
         return
+    elements = former.elements - present.elements
+    if elements:
+        verification.tell(
+            name,
+            message(
+                "verify_other_elements",
+                "holds {elements}, which tankcal {version} does not write; they can cover or "
+                "replace its text",
+                elements=", ".join(sorted(elements))[:80],
+                version=present_versions["tankcal"],
+            ),
+        )
+        return
     differences = former.missing_in(present, same_version=same_version)
     if not differences and same_version:
         differences = present.missing_in(former, same_version=True)

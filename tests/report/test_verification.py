@@ -22,6 +22,7 @@ from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.record.manifest import PACKAGES
 from tankcal.report.comparison import write_comparison
+from tankcal.report.paper_content import content_of_paper
 from tankcal.report.verification import verify
 
 pytestmark = pytest.mark.slow
@@ -271,12 +272,22 @@ def _stream_of(data):
     return stream
 
 
-FORGERIES = {"report.html": in_page, "capacity.xlsx": in_workbook, "certificate.pdf": in_pdf}
+def note_on_page(path):
+    from pypdf import PdfReader, PdfWriter
+    from pypdf.annotations import FreeText
+
+    writer = PdfWriter(clone_from=PdfReader(path))
+    writer.add_annotation(0, FreeText(text="U = 0.1 m3", rect=(50, 50, 300, 100)))
+    writer.write(path)
+
+
+FORGERIES = {"report.html": in_page, "capacity.xlsx": in_workbook, "certificate.pdf": in_pdf,
+             "working-papers.pdf": note_on_page}  # fmt: skip
 
 
 @pytest.mark.parametrize(("name", "other"), draws(
     [("report.html", "another typst"), ("capacity.xlsx", "a later tankcal"),
-     ("certificate.pdf", "nothing")],
+     ("certificate.pdf", "nothing"), ("working-papers.pdf", "a later tankcal")],
     list(product(FORGERIES, OTHERS)),
 ))  # fmt: skip
 def test_forged_papers_of_another_maker_are_told_of(job, capsys, name, other):
@@ -288,6 +299,55 @@ def test_forged_papers_of_another_maker_are_told_of(job, capsys, name, other):
     if name == "certificate.pdf" and other == "a later tankcal":
         pytest.skip("a later version may leave numbers out; pages that are gone are no numbers")
     assert name in {file for file, _ in told(results, hashes_only=False)}
+
+
+def script_of_pdf(path):
+    from pypdf import PdfReader, PdfWriter
+    from pypdf.generic import DictionaryObject, NameObject
+
+    writer = PdfWriter(clone_from=PdfReader(path))
+    writer.root_object[NameObject("/OpenAction")] = DictionaryObject()
+    writer.write(path)
+
+
+def in_text(before, after):
+    def alter(path):
+        text = path.read_text(encoding="utf-8")
+        assert before in text
+        path.write_text(text.replace(before, after, 1), encoding="utf-8")
+
+    return alter
+
+
+def format_of_cells(path):
+    """Every cell of a number format shows 9.9."""
+    book = openpyxl.load_workbook(path)
+    cells = (cell for sheet in book for row in sheet.iter_rows() for cell in row)
+    next(one for one in cells if isinstance(one.value, float)).number_format = '"9.9"'
+    book.save(path)
+
+
+COVERS = {
+    "text of a style": ("report.html", in_text("</style>", "td::after{content:'9'}</style>")),
+    "handler": ("report.html", in_text("<body", "<body onload=\"this.innerHTML='9'\"")),
+    "frame": ("report.html", in_text("</body>", "<iframe srcdoc='9'></iframe></body>")),
+    "style from elsewhere": ("report.html", in_text("</head>", "<link href='a.css'></head>")),
+    "annotation": ("certificate.pdf", note_on_page),
+    "script of a PDF": ("certificate.pdf", script_of_pdf),
+    "format of cells": ("capacity.xlsx", format_of_cells),
+}
+
+
+@pytest.mark.slow(after=4)
+@pytest.mark.parametrize("cover", COVERS)
+def test_what_covers_the_text_of_a_paper_is_told_of(cover, tmp_path, job):
+    """Numbers with few digits are not compared with papers of other versions; covers are."""
+    name, alter = COVERS[cover]
+    path = tmp_path / name
+    path.write_bytes((job / "results" / name).read_bytes())
+    before = content_of_paper(name, path.read_bytes()).elements
+    alter(path)
+    assert content_of_paper(name, path.read_bytes()).elements - before
 
 
 def test_papers_older_than_their_record_are_refused(job):
