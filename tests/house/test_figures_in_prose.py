@@ -5,6 +5,7 @@ import math
 import re
 import shutil
 
+import numpy as np
 import pytest
 from conftest import EXAMPLE, ROOT
 from job_builder import write_folder
@@ -82,3 +83,88 @@ def test_rows_of_a_table_by_its_radii(tmp_path):
     found = [2 * radius, u, middle.U_m3, of_radii, at_joint.U_m3]
     assert rounded(found, printed) == printed
     assert at_joint.U_m3 == pytest.approx(2 * of_radii, rel=0.02)
+
+
+def volume_of_lying_tank(height_m, radius_m=1.2, length_m=10.0):
+    """Closed form of a horizontal cylinder with flat ends, m3."""
+    h = np.asarray(height_m)
+    chord = np.sqrt(np.maximum(2 * radius_m * h - h**2, 0))
+    angle = np.arccos(np.clip(1 - h / radius_m, -1, 1))
+    return length_m * (radius_m**2 * angle - (radius_m - h) * chord)
+
+
+def error_of_interpolation(rows_m):
+    """(largest error of straight lines between rows, L; its height, m)."""
+    heights = np.linspace(0, 2.4, 240_001)
+    lines = np.interp(heights, rows_m, volume_of_lying_tank(rows_m))
+    errors = 1000 * np.abs(lines - volume_of_lying_tank(heights))
+    return errors.max(), heights[errors.argmax()]
+
+
+def test_interpolation_in_a_table_of_a_lying_tank():
+    printed = figures_of(
+        "docs/rings.md",
+        "the error is () L with rows of 1 mm, () L with 5 mm, () L with 10 mm, and () L with 50 mm",
+    )
+    even = [error_of_interpolation(np.linspace(0, 2.4, n + 1))[0] for n in (2400, 480, 240, 48)]
+    assert rounded(even, printed) == printed
+    printed = figures_of(
+        "docs/table.md",
+        "With rows of 1 cm it has an error of () L at () mm, and an equal error below its top. "
+        "With rows of 2 mm up to () m and from () m on (() rows in all) the error is below () L",
+    )
+    largest, height_m = error_of_interpolation(np.linspace(0, 2.4, 241))
+    low, high = float(printed[2]), float(printed[3])
+    fine = np.unique(np.round([*np.arange(0, low, 0.002), *np.arange(low, high, 0.01),
+                               *np.arange(high, 2.4005, 0.002)], 4))  # fmt: skip
+    assert rounded([largest, min(height_m, 2.4 - height_m) * 1000], printed[:2]) == printed[:2]
+    assert len(fine) == int(printed[4])
+    assert error_of_interpolation(fine)[0] < float(printed[5])
+
+
+def test_rounding_of_a_table_of_a_lying_tank():
+    printed = figures_of(
+        "docs/table.md",
+        "below has () rows, rounded to the litre. The largest error is () L if each row is rounded "
+        "separately, and () L if rounded steps are added",
+    )
+    volumes = 1000 * volume_of_lying_tank(np.linspace(0, 2.4, 241))
+    added = np.abs(np.cumsum(np.rint(np.diff(volumes, prepend=0))) - volumes).max()
+    found = [len(volumes), np.abs(np.rint(volumes) - volumes).max(), added]
+    assert rounded(found, printed) == printed
+
+
+def test_figures_of_closed_forms():
+    printed = figures_of(
+        "docs/strapping.md",
+        "A tape of () N/m (13 mm wide, 0.2 mm thick) at () N over a free span of (), () or () m "
+        "reads (), () or () mm too long",
+    )
+    weight, tension, *spans = map(float, printed[:5])
+    sag = [1000 * weight**2 * span**3 / (24 * tension**2) for span in spans]
+    assert rounded(sag, printed[5:]) == printed[5:]
+    arcsec = math.radians(1 / 3600)
+    printed = figures_of(
+        "docs/reference-lines.md",
+        '()" over () m is () mm, or () ppm of the volume at () m',
+    )
+    angle, length, of_radius, ppm, radius = map(float, printed)
+    assert 1000 * angle * arcsec * length == pytest.approx(of_radius, abs=0.005)
+    assert 2e3 * of_radius / radius == pytest.approx(ppm, abs=1)
+    printed = figures_of(
+        "docs/tangents.md",
+        "a sight of () seconds of arc over a tangent of () m contributes () mm to a radius, and "
+        "sixteen sights per level () mm",
+    )
+    angle, length = map(float, printed[:2])
+    one = 1000 * angle * arcsec * length
+    assert rounded([one, one / 4], printed[2:]) == printed[2:]
+    printed = figures_of(
+        "docs/rings.md",
+        "p R² / (E t): () mm for R () m, () bar and () mm, compared with () mm for R () m, () bar "
+        "and () mm",
+    )
+    for bulge, *sizes in (printed[:4], printed[4:]):
+        radius, bar, plate = map(float, sizes)
+        found = 1000 * bar * 1e5 * radius**2 / (206e9 * plate / 1000)
+        assert rounded([found], [bulge]) == (bulge,)
