@@ -422,7 +422,8 @@ def _refuse_low_rows(former, rows, fits):
             message(
                 "read_low_rows",
                 "{name}: the rows up to {last:.4g} m do not reach high enough to tell diameter "
-                "from length and ends: diameters such as {least:.3g} and {most:.3g} m fit equally well",
+                "from length and ends: diameters such as {least:.3g} and {most:.3g} m fit "
+                "equally well",
                 name=str(former.name),
                 last=float(rows.height[-1]),
                 least=min(diameters),
