@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.gum.distributions import within
+from tankcal.job.checking import has_rows
 from tankcal.job.checks.bearing import useless_inputs
 from tankcal.job.checks.extent import is_strapped
 from tankcal.job.contract import INPUTS
@@ -25,7 +26,6 @@ from tankcal.job.model import (
     Job,
     Material,
     Mesh,
-    Points,
     Roof,
     Ship,
     Sphere,
@@ -53,8 +53,6 @@ class Attached:
 
     Attributes
     ----------
-    covariance_m2 : ndarray, shape (3n, 3n), or None
-        Covariance matrix of the n points, m2; None: not given.
     mesh : tuple or None
         ((name, SHA-256, size in bytes), content) of the mesh file; None: not given.
     rule : tuple or None
@@ -62,7 +60,6 @@ class Attached:
         tankcal; None in place of the pair: no rule given.
     """
 
-    covariance_m2: np.ndarray | None
     mesh: tuple | None
     rule: tuple[Rule, tuple | None] | None
 
@@ -198,12 +195,10 @@ def make_job(raw, values, tables, attached, measurements, warnings):
     Job
     """
     kind, within_mm = values["tank"]["kind"], values["checks"]["diameter_within_mm"]
-    points = _points(tables["points"], attached.covariance_m2)
-    has_points = points is not None or measurements is not None
+    has_points = has_rows(tables["points"]) or measurements is not None
     frame = make_frame(raw, values, tables, measurements, warnings, has_points)
     return replace(
         frame,
-        points=points,
         inputs=inputs_of(values, tables),
         correlations=correlations_of(tables["correlations"]),
         stated=stated_of(tables["stated"]),
@@ -338,23 +333,6 @@ def gauged_plate(gauge_mean):
         return {}
     plate, _, paint = gauge_mean
     return {"thickness_m": plate} | ({} if paint is None else {"paint_m": paint})
-
-
-def _points(table, covariance):
-    if table is None or table.is_empty:
-        return None
-    sd_m = None
-    if table.columns["sx_mm"] is not None:
-        sd_m = np.column_stack([table.of(f"s{axis}_mm") for axis in "xyz"]).astype(float) / 1000
-    return Points(
-        names=tuple(table.of("point")),
-        xyz_m=np.column_stack([table.of(f"{axis}_m") for axis in "xyz"]).astype(float),
-        sd_m=sd_m,
-        covariance_m2=covariance,
-        section=tuple(table.of("section")),
-        generatrix=tuple(table.of("generatrix")),
-        rows=table.rows,
-    )
 
 
 def _bottom(values, table):

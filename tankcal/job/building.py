@@ -13,12 +13,10 @@ from tankcal.job.checks.extent import (
     is_strapped,
 )
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
-from tankcal.job.covariance import read_covariance
 from tankcal.job.entries import ColumnValues, kind_of, read_columns, read_register, read_settings
 from tankcal.job.overrulings import make_overrulings
 from tankcal.job.rule_files import find_rule
 from tankcal.job.tables import (
-    COVARIANCE_FILE,
     REGISTERS,
     SURVEY_TABLES,
     TABLES,
@@ -57,7 +55,7 @@ def job_of(raw, log, is_whole=True):
     tables = _read_tables(raw, registers, is_whole, log)
     values = read_settings(raw, log, is_whole) if raw.settings is not None else None
     check_all(values, tables, registers, raw, is_whole, log)
-    attached = _attached(raw, values, tables, log) if is_whole else None
+    attached = _attached(raw, values, log) if is_whole else None
     log.stop_if_problems()
     measurements = None
     if has_survey(tables):
@@ -213,36 +211,12 @@ def _missing(raw, name):
     )
 
 
-def _attached(raw, values, tables, log):
+def _attached(raw, values, log):
     """Read the files beside the settings; values is None if the settings are unreadable."""
     mesh = rule = None
     if values is not None:
         mesh, rule = values["mesh"]["file"], values["table"]["rule"]
     return Attached(
-        _covariance(raw, tables["points"], log),
         None if mesh is None else read_mesh_file(raw.folder, mesh, log),
         None if rule is None else find_rule(raw, rule, log),
     )
-
-
-def _covariance(raw, points, log):
-    """Covariance matrix of the points, m2; None if not given or not usable."""
-    data = raw.archives.get(COVARIANCE_FILE)
-    if data is None:
-        return None
-    if points is None:
-        is_unreadable = "points" in raw.tables and raw.tables["points"] is None
-        if not is_unreadable:
-            expected = message(
-                "covariance_without_points",
-                "given without its points; expected points.csv beside it",
-            )
-            log.problem(COVARIANCE_FILE, expected)
-        return None
-    if points.columns["sx_mm"] is not None:
-        expected = message(
-            "covariance_beside_sds",
-            "given together with sx_mm, sy_mm, sz_mm of the points; expected only one of them",
-        )
-        log.problem(COVARIANCE_FILE, expected)
-    return read_covariance(data, points.of("point"), log)

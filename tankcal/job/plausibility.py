@@ -48,6 +48,7 @@ E_GPA = {
 WATER_STRESS_MPA = 350.0  # largest stress in the thinnest plausible plates
 # Smallest design stress.
 LEAST_STRESS_MPA = {"carbon_steel": 137.0, "stainless_steel": 120.0, "aluminium": 55.0}
+MIN_POINTS_PER_COURSE = 5  # fewer points are a problem
 LIGHT, HEAVY = 0.45, 1.0  # relative densities: of liquid not given; least for the upper limit
 # Largest thickness: addend and factor to the need of head and code.
 THICK_MM, THICK_FACTOR = 6.5, 1.4

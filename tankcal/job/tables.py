@@ -27,8 +27,18 @@ SURVEY_TABLES = (
 )
 OVERRULING_TABLES = ("overrulings",)
 # The input files of a record are in this order: first the methods for upright tanks.
-_UPRIGHT = tuple(table for method in methods_for("vertical") for table in method.tables)
-_OTHERS = tuple(table for method in methods() for table in method.tables if table not in _UPRIGHT)
+_UPRIGHT = tuple(
+    table
+    for method in methods_for("vertical")
+    for table in method.tables
+    if table not in TANK_TABLES
+)
+_OTHERS = tuple(
+    table
+    for method in methods()
+    for table in method.tables
+    if table not in (*TANK_TABLES, *_UPRIGHT)
+)
 TABLES = TANK_TABLES + _UPRIGHT
 TABLES += _OTHERS + SURVEY_TABLES + OVERRULING_TABLES
 REGISTERS = {  # name of an entry in each list
@@ -42,7 +52,7 @@ SETTINGS_SHEET = "job"
 WORKBOOK_FILE = "job.xlsx"  # workbook in a job folder
 REFUSED_FILE = "image_points_refused.csv"  # written beside image_points.csv, never read
 COVARIANCE_FILE = "points_cov.npz"
-ARCHIVES = (COVARIANCE_FILE, *(file for method in methods() for file in method.archives))
+ARCHIVES = tuple(file for method in methods() for file in method.archives)
 
 MAX_FILE_BYTES = 200_000_000  # largest file of a job
 MAX_LINES, MAX_COLUMNS = 500_000, 100  # largest text table

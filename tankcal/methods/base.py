@@ -15,6 +15,7 @@ from tankcal.entry_points import find_entry_points
 
 GROUP = "tankcal.methods"  # entry points of methods in other distributions
 _BUILT_IN = (
+    "tankcal.methods.points:PointsMethod",
     "tankcal.methods.strapping:StrappingMethod",
     "tankcal.methods.lines:LinesMethod",
     "tankcal.methods.hits:HitsMethod",

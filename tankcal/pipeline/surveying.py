@@ -19,7 +19,6 @@ from tankcal.pipeline.checks.cross_checks import is_within_wall, refuse_other_si
 from tankcal.pipeline.checks.nominal_size import refuse_other_size
 from tankcal.pipeline.checks.survey import refuse_undetermined
 from tankcal.pipeline.overruling.points import refuse_kept_readings, with_decided_readings
-from tankcal.pipeline.wall.finding import find_wall
 from tankcal.pipeline.wall.point_covariance import s_transform
 
 if TYPE_CHECKING:
@@ -185,8 +184,6 @@ def _survey(job, progress, network):
     for method in given_methods(job):
         if method.finds(job):
             return method.find(job, progress, network).survey
-    if job.tank.kind == "vertical":
-        return find_wall(job, progress, network.dof, network.amplitudes)
     if job.mesh is not None:
         from tankcal.pipeline.tanks.ship import check_pipe
         from tankcal.tank.meshes import parse_mesh
@@ -195,13 +192,4 @@ def _survey(job, progress, network):
         mesh = parse_mesh(job.mesh.file, job.mesh.data, job.mesh.unit_m)
         check_pipe(job, mesh)
         return mesh
-    if job.points is not None:
-        from tankcal.pipeline.solids.scan import fit_scan
-
-        progress(
-            message(
-                "fitting_wall", "fitting the wall to {count} points", count=len(job.points.names)
-            )
-        )
-        return fit_scan(job, network.dof)
     return None

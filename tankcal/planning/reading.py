@@ -444,7 +444,7 @@ def _job(raw, values, tables, registers, log):
     Its measurements are cameras, instruments, control and settings only.
     """
     rule = values["table"]["rule"]
-    attached = Attached(None, None, None if rule is None else find_rule(raw, rule, log))
+    attached = Attached(None, None if rule is None else find_rule(raw, rule, log))
     log.stop_if_problems()
     measurements = make_measurements(values, tables, registers)
     tables = tables | NO_IMAGE_POINTS

@@ -4,18 +4,16 @@ Each check reports problems and warnings to `log` and returns nothing. A check i
 values are missing or invalid, because these faults have already been reported.
 """
 
-from tankcal.job.checking import has_rows, loads_sphere
+from tankcal.job.checking import loads_sphere
 from tankcal.job.checks.bearing import useless_inputs
 from tankcal.job.checks.extent import (
     Extent,
     estimate_diameter_m,
     extent_of,
-    has_shape,
     has_wall_points,
     is_supplemented,
     wall_of,
 )
-from tankcal.job.checks.geometry import check_cylinder, check_scan
 from tankcal.job.checks.plausible import check_plausible
 from tankcal.job.checks.settings import check_settings, check_steps
 from tankcal.job.checks.survey import check_survey
@@ -26,7 +24,6 @@ from tankcal.job.contract.courses import check_courses
 from tankcal.job.contract.deadwood import check_deadwood
 from tankcal.job.contract.lying import check_horizontal, check_sphere
 from tankcal.job.contract.overrulings import check_overrulings
-from tankcal.job.contract.points import check_points
 from tankcal.job.contract.roof import check_roof
 from tankcal.job.contract.ship import check_ship
 from tankcal.job.contract.stated import check_stated
@@ -70,16 +67,12 @@ def check_all(values, tables, registers, raw, is_whole, log):
 def check_tank(values, tables, raw, log):
     """Run all checks except those of the survey; parameters as for `check_all`."""
     kind = kind_of(raw)
-    points, extent = tables["points"], Extent()
+    extent = Extent()
     if values is not None:
         extent = extent_of(values, tables, kind)
         check_steps(values["table"], extent, raw, log)
         check_settings(values, tables, extent, kind, raw, log)
         check_plausible(values, tables, extent, kind, raw, log)
-    # Any measurement of the shape of the wall replaces the points.
-    needs_points = kind == "vertical" and not has_shape(tables)
-    if points is not None and (needs_points or has_rows(points)):
-        check_points(points, log)
     if values is not None:
         _check_of_kind(values, tables, extent, kind, raw, log)
     _check_uncertainty(values, tables, extent, kind, raw, log)
@@ -103,13 +96,9 @@ def _check_of_kind(values, tables, extent, kind, raw, log):
             check_courses(courses, values, log)
         if tables["welds"] is not None:
             check_welds(tables["welds"], courses, log)
-        if points is not None:
-            check_cylinder(points, tables, values, raw, log)
         check_bottom(values, tables["bottom"], points, extent, raw, log)
         check_top(values, is_supplemented(tables), raw, log)
         check_roof(values["roof"], extent, raw, log)
-    elif has_rows(points):
-        check_scan(points, values, kind, raw, log)
     if kind == "horizontal":
         check_horizontal(values, wall_of(tables), raw, log, estimate_diameter_m(kind, tables))
     if kind == "sphere":

@@ -10,7 +10,6 @@ from tankcal.job.contract import (
     courses,
     deadwood,
     overrulings,
-    points,
     roof,
     ship,
     stadia,
@@ -38,7 +37,7 @@ SECTIONS = (
     *("adjustment", "adjustment.camera", "certificate"),
     "csv",
 )
-_TABLES = (points, courses, welds, bottom, deadwood, uncertainty, correlations, stated)
+_TABLES = (courses, welds, bottom, deadwood, uncertainty, correlations, stated)
 COLUMNS = {table.__name__.rpartition(".")[2]: table.COLUMNS for table in _TABLES}
 COLUMNS |= stadia.COLUMNS
 for _method in methods():

@@ -71,10 +71,6 @@ EXAMPLES_OF_KEYS = {
     "instruments.u_scale_ppm": 15.0,
 }
 EXAMPLES_OF_TABLES = {
-    "points": [
-        {"point": "P101", "x_m": 6.4987, "y_m": 0.0213, "z_m": 0.9502, "section": "1"},
-        {"point": "P102", "x_m": 6.2761, "y_m": 1.6834, "z_m": 0.9498, "section": "1"},
-    ],
     "courses": [
         {"course": "1", "height_m": 1.9, "thickness_mm": 8.0, "paint_mm": 0.3},
         {"course": "2", "height_m": 1.9, "thickness_mm": 6.3, "paint_mm": 0.3},

@@ -46,7 +46,6 @@ SECTION_NOTES = {
     "csv": "how the CSV files are written; ; and , for a spreadsheet that uses decimal commas",
 }
 TABLE_NOTES = {
-    "points": "one row for each surveyed point of the wall",
     "courses": "one row for each course (ring of plates), from the bottom up",
     "welds": "one row for each vertical weld of a course whose azimuth is known; may stay empty",
     "bottom": "one row for each surveyed point of the bottom (x_m, y_m, z_m), or for each level"

@@ -2,9 +2,9 @@
 
 from tankcal.job.checking import has_rows, tell
 from tankcal.job.checks.extent import has_survey
-from tankcal.job.checks.geometry import MIN_POINTS_OF_SCAN
 from tankcal.messages import message
 from tankcal.methods.hits.checks import check_hits
+from tankcal.methods.points.checks import MIN_POINTS_OF_SCAN
 
 TIES = ("directions", "slope_distances")  # tables that tie a set-up to a network
 

@@ -3,7 +3,6 @@
 import numpy as np
 
 from tankcal.job.checking import course_heights, places_of, tell
-from tankcal.job.checks.geometry import MIN_POINTS_PER_COURSE
 from tankcal.job.plausibility import (
     DISH_RADIUS,
     END_DEPTH,
@@ -14,6 +13,7 @@ from tankcal.job.plausibility import (
     KNUCKLE_RADIUS,
     LENGTH_OVER_DIAMETER,
     LEVEL_M,
+    MIN_POINTS_PER_COURSE,
     MOST_LENGTH_OVER_DIAMETER,
     MOST_RINGS,
     NEAR_JOINT_M,

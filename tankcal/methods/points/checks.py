@@ -1,18 +1,115 @@
-"""Checks of points, drawing and courses: common unit and frame, sufficient points."""
+"""Checks of points, drawing and courses: names, common unit and frame, sufficient points."""
 
 import numpy as np
 
-from tankcal.job.checking import UNIT_FACTOR, course_heights, places_of, tell
-from tankcal.job.checks.extent import is_completed
+from tankcal.job.checking import (
+    UNIT_FACTOR,
+    course_heights,
+    has_rows,
+    places_of,
+    refuse_repeated,
+    tell,
+    tiny_sd,
+)
+from tankcal.job.checks.extent import has_shape, is_completed
+from tankcal.job.covariance import read_covariance
+from tankcal.job.entries import kind_of
+from tankcal.job.plausibility import MIN_POINTS_PER_COURSE
+from tankcal.job.tables import COVARIANCE_FILE
 from tankcal.messages import message
 from tankcal.survey.reference_line import courses_with_radius
 
-MIN_POINTS_PER_COURSE = 5  # fewer points are a problem
 FEW_POINTS_PER_COURSE = 10  # fewer points cause a warning
 # Smallest number of points on the wall of a lying tank.
 MIN_POINTS_OF_SCAN = {"horizontal": 20, "sphere": 12}
 DOUBTFUL_EXTENT = 1.5  # width of the points over that of the tank: feet, or clutter
 LARGEST_SPHERE_M = 100  # largest diameter of a sphere without a nominal diameter
+MAX_POINTS = 50_000  # the record contains every point
+# If all standard deviations are below: warning, problem (probably in another unit).
+TINY_SD_MM, SURELY_TINY_SD_MM = 0.01, 0.0001
+
+
+def check_points_of(values, tables, raw, log):
+    """Check points.csv and points_cov.npz with the settings; parameters as for `Method.check`."""
+    kind, points = kind_of(raw), tables["points"]
+    # Any measurement of the shape of the wall replaces the points.
+    needs_points = kind == "vertical" and not has_shape(tables)
+    if points is not None and (needs_points or has_rows(points)):
+        check_points(points, log)
+    if values is not None and kind == "vertical" and points is not None:
+        check_cylinder(points, tables, values, raw, log)
+    elif values is not None and has_rows(points):
+        check_scan(points, values, kind, raw, log)
+    read_points_covariance(points, raw, log)
+
+
+def check_points(points, log):
+    """Check number, names, places, sections and standard deviations of the points."""
+    if not points.rows and not points.skipped:
+        log.problem(
+            points.file,
+            message("no_points_at_all", "no rows; expected one row for each surveyed point"),
+        )
+        return
+    if len(points.rows) > MAX_POINTS:
+        expected = message(
+            "points_too_many",
+            "{count} points; expected at most {most}, because the record contains every point:"
+            " declare the files of a larger scan in clouds.toml",
+            count=len(points.rows),
+            most=MAX_POINTS,
+        )
+        log.problem(points.file, expected)
+    refuse_repeated(points, "point", log)
+    _warn_same_places(points, log)
+    _refuse_some_sections(points, log)
+    sds = ("sx_mm", "sy_mm", "sz_mm")
+    given = [name for name in sds if points.columns[name] is not None]
+    for name in sds:
+        if given and name not in given:
+            expected = message(
+                "sd_of_some_axes",
+                "missing, but {given} is given; expected both, for all points or for none",
+                given=given[0],
+            )
+            log.problem(points.file, expected, None, name)
+    for name in given:
+        values = [sd for sd in points.of(name) if sd is not None]
+        if values and max(values) < TINY_SD_MM:
+            report = log.problem if max(values) < SURELY_TINY_SD_MM else log.warning
+            report(points.file, tiny_sd("mm", max(values)), None, name)
+
+
+def _warn_same_places(points, log):
+    """Warn of points with equal coordinates."""
+    first_row = {}
+    places = zip(points.of("x_m"), points.of("y_m"), points.of("z_m"), strict=True)
+    for row, place in zip(points.rows, places, strict=True):
+        if None in place:
+            continue
+        if place in first_row:
+            expected = message(
+                "same_coordinates",
+                "coordinates of row {row} again; counted once",
+                row=first_row[place],
+            )
+            log.warning(points.file, expected, row, "x_m")
+        else:
+            first_row[place] = row
+
+
+def _refuse_some_sections(points, log):
+    """Refuse sections of some points only, because the other points would be assigned by height."""
+    sections = points.of("section")
+    if not any(sections):
+        return
+    for row, section in zip(points.rows, sections, strict=True):
+        if not section:
+            expected = message(
+                "section_of_some_points",
+                "blank; expected a section for every point or for none (placed by height)",
+            )
+            log.problem(points.file, expected, row, "section")
 
 
 def check_cylinder(points, tables, values, raw, log):
@@ -201,3 +298,26 @@ def _courses_of(table):
         return set()
     pairs = zip(table.of("course"), table.of("use"), strict=True)
     return {name for name, use in pairs if use != "check"}
+
+
+def read_points_covariance(points, raw, log):
+    """Covariance matrix of the points, m2; None if not given or not usable."""
+    data = raw.archives.get(COVARIANCE_FILE)
+    if data is None:
+        return None
+    if points is None:
+        is_unreadable = "points" in raw.tables and raw.tables["points"] is None
+        if not is_unreadable:
+            expected = message(
+                "covariance_without_points",
+                "given without its points; expected points.csv beside it",
+            )
+            log.problem(COVARIANCE_FILE, expected)
+        return None
+    if points.columns["sx_mm"] is not None:
+        expected = message(
+            "covariance_beside_sds",
+            "given together with sx_mm, sy_mm, sz_mm of the points; expected only one of them",
+        )
+        log.problem(COVARIANCE_FILE, expected)
+    return read_covariance(data, points.of("point"), log)

@@ -1,0 +1,24 @@
+"""From the checked points.csv and points_cov.npz to `Points`, in SI."""
+
+import numpy as np
+
+from tankcal.job.tables import Log
+from tankcal.methods.points.checks import read_points_covariance
+from tankcal.survey.points import Points
+
+
+def make_points(tables, raw):
+    """Build `Points` from tables and registers without problems."""
+    table = tables["points"]
+    sd_m = None
+    if table.columns["sx_mm"] is not None:
+        sd_m = np.column_stack([table.of(f"s{axis}_mm") for axis in "xyz"]).astype(float) / 1000
+    return Points(
+        names=tuple(table.of("point")),
+        xyz_m=np.column_stack([table.of(f"{axis}_m") for axis in "xyz"]).astype(float),
+        sd_m=sd_m,
+        covariance_m2=read_points_covariance(table, raw, Log()),
+        section=tuple(table.of("section")),
+        generatrix=tuple(table.of("generatrix")),
+        rows=table.rows,
+    )
