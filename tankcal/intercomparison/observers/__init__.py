@@ -2,6 +2,9 @@
 
     parts = METHODS["tape"](tank, Chance(rng), asked)
 
+Each method takes the true `Tank`, the source of random errors (`Chance`) and the requested
+conditions of the capacity table (`Asked`). It returns the `Parts` of a job.
+
 A simulation adds errors of the instruments to the true tank, and declares their standard
 uncertainties. The formulas are deliberately independent of `tankcal.survey` and `tankcal.geometry`,
 so that an error there does not affect the true values.

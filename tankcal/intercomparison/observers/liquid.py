@@ -27,21 +27,7 @@ HEADINGS = [
 
 
 def observe_liquid(tank, chance, asked):
-    """Simulate two runs with one meter; the radii of the courses are not measured.
-
-    Parameters
-    ----------
-    tank : Tank
-        The true tank.
-    chance : Chance
-        Random errors.
-    asked : Asked
-        Requested conditions of the capacity table.
-
-    Returns
-    -------
-    Parts
-    """
+    """Simulate two runs with one meter; the radii of the courses are not measured."""
     site = observe_site(tank, chance, asked, outside=False)
     del site.parts.tables["bottom"]  # the first batch measures the volume below the first dip
     factor, zero = FACTOR * (1 + chance.normal(U_FACTOR)), chance.normal(DIP_ZERO_SD_M)

@@ -21,21 +21,7 @@ SPOILT, FAR_MM = 0.003, (0.01, 0.05)  # share and size of gross errors in the im
 
 
 def observe_photographs(tank, chance, asked):
-    """Simulate photographs of rings of targets, with control points by a total station.
-
-    Parameters
-    ----------
-    tank : Tank
-        The true tank.
-    chance : Chance
-        Random errors.
-    asked : Asked
-        Requested conditions of the capacity table.
-
-    Returns
-    -------
-    Parts
-    """
+    """Simulate photographs of rings of targets, with control points by a total station."""
     rng = chance.rng
     site = observe_site(tank, chance, asked, outside=True, frame_m=FRAME_M)
     names, azimuth, z = _targets(rng, tank)

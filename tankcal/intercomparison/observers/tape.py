@@ -37,21 +37,7 @@ def girth_m(tank, z):
 
 
 def observe_tape(tank, chance, asked):
-    """Simulate two circumferences at each of two levels of each course.
-
-    Parameters
-    ----------
-    tank : Tank
-        The true tank.
-    chance : Chance
-        Random errors.
-    asked : Asked
-        Requested conditions of the capacity table.
-
-    Returns
-    -------
-    Parts
-    """
+    """Simulate two circumferences at each of two levels of each course."""
     site = observe_site(tank, chance, asked, outside=True)
     strap(site, range(len(tank.courses_m)))
     # Standard deviation of the radius round the wall, root mean square over the courses, m.
@@ -108,21 +94,7 @@ def strap(site, courses, repeats=REPEATS):
 
 
 def observe_lines(tank, chance, asked):
-    """Simulate offsets from equally spaced lines, on both faces at two levels of each course.
-
-    Parameters
-    ----------
-    tank : Tank
-        The true tank.
-    chance : Chance
-        Random errors.
-    asked : Asked
-        Requested conditions of the capacity table.
-
-    Returns
-    -------
-    Parts
-    """
+    """Simulate offsets from equally spaced lines, on both faces at two levels of each course."""
     rng = chance.rng
     site = observe_site(tank, chance, asked, outside=True)
     strap(site, [0], FIRST_COURSE_REPEATS)

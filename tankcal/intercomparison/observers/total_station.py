@@ -33,19 +33,6 @@ def observe_hits(tank, chance, asked):
     """Simulate one set-up with two levels of each course.
 
     The ground mark of the set-up is the origin, and its horizontal circle defines the axes.
-
-    Parameters
-    ----------
-    tank : Tank
-        The true tank.
-    chance : Chance
-        Random errors.
-    asked : Asked
-        Requested conditions of the capacity table.
-
-    Returns
-    -------
-    Parts
     """
     rng = chance.rng
     offset = OFF_PART * tank.radius_m * rng.uniform(-1, 1, 2)
@@ -216,21 +203,7 @@ def read_wall(chance, site, station, aims, tool, zero=0.0):
 
 
 def observe_points(tank, chance, asked):
-    """Simulate rings of points in each course, from inside or outside.
-
-    Parameters
-    ----------
-    tank : Tank
-        The true tank.
-    chance : Chance
-        Random errors.
-    asked : Asked
-        Requested conditions of the capacity table.
-
-    Returns
-    -------
-    Parts
-    """
+    """Simulate rings of points in each course, from inside or outside."""
     rng = chance.rng
     site = observe_site(tank, chance, asked, outside=rng.uniform() < 0.5, frame_m=FRAME_M)
     azimuth, z, names = _layout(rng, tank)
