@@ -202,7 +202,7 @@ def _simulate(prediction, options, show):
 
 def _network_summary(prediction):
     """Yield the items of the plan and the predicted quality of its points."""
-    from tankcal.planning.bases import group_by_ends
+    from tankcal.planning.places import group_by_ends
 
     plan = prediction.plan
     solution = prediction.network.adjusted.solution

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.geometry.field.cells import MOST_SITES
+from tankcal.geometry.field.sites import MOST_SITES
 from tankcal.messages import message
 from tankcal.methods.base import accompanying_methods, given_methods, method_of
 from tankcal.pipeline.checks.cross_checks import check_mesh, check_scan, check_wall

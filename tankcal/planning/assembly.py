@@ -10,7 +10,6 @@ import numpy as np
 from tankcal.geometry.field.amplitudes import assumed_amplitudes
 from tankcal.geometry.rotations import rotation_of_view
 from tankcal.job.measuring import ARCSEC
-from tankcal.planning.bases import bases_of
 from tankcal.planning.contract import PLAN_FILE, forms_m
 from tankcal.planning.model import (
     ControlPoint,
@@ -22,7 +21,14 @@ from tankcal.planning.model import (
     Targets,
     Tie,
 )
-from tankcal.planning.places import full_turn, joints_of, places_around, plate_m, row_heights_m
+from tankcal.planning.places import (
+    bases_of,
+    full_turn,
+    joints_of,
+    places_around,
+    plate_m,
+    row_heights_m,
+)
 from tankcal.planning.visibility import obstacles_of
 
 # Defaults of [limits]: largest angle of incidence, degrees, and fewest rays per point.

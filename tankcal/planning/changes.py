@@ -6,9 +6,8 @@ import numpy as np
 
 from tankcal.errors import TankcalError
 from tankcal.planning.assembly import tape_of
-from tankcal.planning.bases import group_by_ends, new_bases
 from tankcal.planning.model import ControlPoint, Plan
-from tankcal.planning.places import places_around, row_heights_m
+from tankcal.planning.places import group_by_ends, new_bases, places_around, row_heights_m
 from tankcal.planning.wall.changes import WALL_ITEMS, wall_changes_of, wall_count
 from tankcal.planning.wall.model import WallPlan
 

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from tankcal.geometry.rotations import angles_of
-from tankcal.planning.bases import readings_of_bases
 from tankcal.planning.model import TAPED
+from tankcal.planning.places import readings_of_bases
 from tankcal.planning.visibility import find_measurable
 from tankcal.survey import Nominal
 from tankcal.survey.measurements import ImageReadings, KnownPoints, Photo, Readings, Setup, Targets

@@ -7,10 +7,9 @@ from tankcal.job.checks.survey.stadia import refuse_itself
 from tankcal.job.contract.stadia import LEAST
 from tankcal.job.tables import Log, nearest
 from tankcal.messages import join_with_and, list_some, message
-from tankcal.planning.bases import STADIA_FILE, base_m
 from tankcal.planning.contract import PLAN_FILE
 from tankcal.planning.model import Box, Pillar
-from tankcal.planning.places import TOUCH_M, joints_m, plate_m
+from tankcal.planning.places import STADIA_FILE, TOUCH_M, base_m, joints_m, plate_m
 from tankcal.planning.visibility import (
     GRAZE_M,
     find_hidden,

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.adjust import UNCONTROLLED, noncentrality
-from tankcal.planning.bases import base_sd_m
 from tankcal.planning.model import TAPED
+from tankcal.planning.places import base_sd_m
 from tankcal.solver.effects import covariances
 from tankcal.survey.observations import ImageCoordinates
 

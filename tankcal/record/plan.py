@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tankcal.planning.bases import group_by_ends
+from tankcal.planning.places import group_by_ends
 from tankcal.planning.prediction import PointOutlook, SectionOutlook
 from tankcal.planning.reliability import GroupReliability
 from tankcal.planning.wall.changes import wall_count

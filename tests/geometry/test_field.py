@@ -14,7 +14,6 @@ from tankcal.geometry.field.amplitudes import (
     estimate_amplitudes,
     likelihood_of,
 )
-from tankcal.geometry.field.cells import cells_of, sites_of_cells
 from tankcal.geometry.field.components import (
     COMPONENTS,
     Heights,
@@ -32,7 +31,7 @@ from tankcal.geometry.field.estimate import (
     hidden_seams_m,
 )
 from tankcal.geometry.field.likelihood import Misfit
-from tankcal.geometry.field.sites import Sites
+from tankcal.geometry.field.sites import Sites, cells_of, sites_of_cells
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall.finding import find_wall
 from tankcal.pipeline.wall_straps import _joined

@@ -24,7 +24,6 @@ from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.geometry.field.amplitudes import assumed_amplitudes, likelihood_of
 from tankcal.geometry.field.estimate import WallField
-from tankcal.geometry.field.information import expect_amplitudes
 from tankcal.geometry.field.sites import Sites
 from tankcal.methods.tangents.wall import touch_wall
 from tankcal.pipeline.surveying import find_survey
@@ -35,7 +34,7 @@ from tankcal.planning.improvements import Effect
 from tankcal.planning.wall.changes import instruments_in_use, wall_changes_of
 from tankcal.planning.wall.design_tables import tangent_sight
 from tankcal.planning.wall.model import PlannedHits, PlannedStrap, even_radius_m, evenness_of_limbs
-from tankcal.planning.wall.nominal_readings import set_nominal_readings
+from tankcal.planning.wall.nominal_readings import expect_amplitudes, set_nominal_readings
 from tankcal.planning.wall.prediction import predict_wall_table
 from tankcal.planning.wall.reading import change_plan, tables_of
 from tankcal.record.plan import WALL_PLAN, plain_of_wall

@@ -14,11 +14,12 @@ from itertools import combinations
 
 import numpy as np
 
-from tankcal.calibration.capacity_at_top import TopOfTank, TopVolume
 from tankcal.calibration.influence.blocks import (
     Block,
     PhotoChanges,
     PositionChanges,
+    TopOfTank,
+    TopVolume,
     compare_blocks,
     make_block,
 )

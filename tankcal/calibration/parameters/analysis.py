@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.calibration.capacity_at_top import TopOfTank, TopVolume
+from tankcal.calibration.influence.blocks import TopOfTank, TopVolume
 from tankcal.calibration.interiors import (
     collect_interiors,
     read_interiors,

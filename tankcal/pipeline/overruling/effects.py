@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.errors import HeightError, InputError, Problem, SolutionError
-from tankcal.geometry.field.cells import MOST_SITES
+from tankcal.geometry.field.sites import MOST_SITES
 from tankcal.job.model.overrulings import Overruling
 from tankcal.messages import message
 from tankcal.methods.base import supplement_of

@@ -8,10 +8,9 @@ import scipy.sparse
 
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.geometry.field.amplitudes import estimate_amplitudes
-from tankcal.geometry.field.cells import MOST_SITES, cells_of, sites_of_cells
 from tankcal.geometry.field.components import COMPONENTS, OVALITY_MODES, ROUND_SHAPES
 from tankcal.geometry.field.estimate import WallField
-from tankcal.geometry.field.sites import Sites, spans_of
+from tankcal.geometry.field.sites import MOST_SITES, Sites, cells_of, sites_of_cells, spans_of
 from tankcal.geometry.outlines import polar
 from tankcal.geometry.shell import WIDE_BAND, course_of, find_shell
 from tankcal.messages import Message, message

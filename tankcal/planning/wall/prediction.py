@@ -9,7 +9,6 @@ import numpy as np
 from tankcal.errors import InputError
 from tankcal.geometry.field.components import COMPONENTS
 from tankcal.geometry.field.estimate import LEVELS
-from tankcal.geometry.field.information import expect_amplitudes
 from tankcal.job.model import Job
 from tankcal.methods.base import supplement_of
 from tankcal.pipeline.checks.homogeneity import OF_SCATTER
@@ -30,6 +29,7 @@ from tankcal.planning.wall.filling import (
     refuse_other_dips,
 )
 from tankcal.planning.wall.model import WallPlan
+from tankcal.planning.wall.nominal_readings import expect_amplitudes
 from tankcal.planning.wall.reading import locate_in_plan
 from tankcal.quadrature import panels
 

@@ -2,7 +2,7 @@
 
 from math import ceil
 
-from tankcal.planning.bases import group_by_ends
+from tankcal.planning.places import group_by_ends
 from tankcal.report import blocks
 from tankcal.report.planning import sketches
 from tankcal.report.planning.rows import field_tables, lost_ties

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from tankcal.planning.bases import group_by_ends
 from tankcal.planning.changes import cost_of
 from tankcal.planning.measurements import BLUNDER_SDS
+from tankcal.planning.places import group_by_ends
 from tankcal.report import blocks
 from tankcal.report.numbers import unit
 from tankcal.report.plain import Column

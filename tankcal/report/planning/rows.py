@@ -7,8 +7,7 @@ import numpy as np
 
 from tankcal.camera.model import PARAMETERS
 from tankcal.geometry.rotations import view_of_rotation
-from tankcal.planning.bases import angle_of_base_rad, base_m
-from tankcal.planning.places import joints_m, place_of
+from tankcal.planning.places import angle_of_base_rad, base_m, joints_m, place_of
 from tankcal.planning.wall.model import WallPlan
 from tankcal.report.plain import Column
 

@@ -5,9 +5,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
 from tankcal.pipeline.plots.style import GREY, INK, PALE, WIDTH, round_factor, styled
-from tankcal.planning.bases import group_by_ends
 from tankcal.planning.model import TAPED, Box
-from tankcal.planning.places import reference_rad
+from tankcal.planning.places import group_by_ends, reference_rad
 from tankcal.report.planning.sketches import (
     BEHIND,
     DASHES,
