@@ -23,6 +23,7 @@ from tankcal.inspection.welds import BANDING, PEAKING
 from tankcal.units import FULL_TURN
 
 BOARD_M = 0.914  # length of the board, 36 in
+ENDS_M = (-BOARD_M / 2, BOARD_M / 2)  # ends of the board from the weld
 REACH_M = 0.150  # distance from the weld within which the largest gap is searched for
 UNCERTAIN = 0.25  # largest u of a determined gap, as a share of its limit
 END_M = 0.04  # half width of the zone at an end of the board that is fitted by a straight line
@@ -79,7 +80,7 @@ class BoardGaps:
     missed_m2: np.ndarray
 
 
-def profile_gaps(s_m, e_m, sd_m, *, board_m=BOARD_M, reach_m=REACH_M, has_bead=False):
+def profile_gaps(s_m, e_m, sd_m, *, has_bead=False):
     """Compute the `BoardGaps` of a profile of cells, or None if no board can be laid over it.
 
     A board requires three things: no hole near the weld, cells on both sides of each end, and no
@@ -96,8 +97,6 @@ def profile_gaps(s_m, e_m, sd_m, *, board_m=BOARD_M, reach_m=REACH_M, has_bead=F
     s_m, e_m, sd_m : ndarray, shape (n,)
         Middles of cells, ascending, equally spaced, 0 at the weld; deviations of the wall, nan if
         unknown; standard deviations of the deviations, m.
-    board_m, reach_m : float, optional
-        Length of the board; distance from the weld within which no hole is allowed, m.
     has_bead : bool, optional
         Whether a bead hides the weld. If so, the wall under the bead is extrapolated from both
         sides.
@@ -116,25 +115,25 @@ def profile_gaps(s_m, e_m, sd_m, *, board_m=BOARD_M, reach_m=REACH_M, has_bead=F
     cell = float(s_m[1] - s_m[0])
     bead = has_bead & (np.abs(s_m) <= BEAD_M + 1e-9)
     known = np.isfinite(e_m) & ~bead
-    if not _has_no_hole(s_m[known | bead], cell, reach_m):
+    if not _has_no_hole(s_m[known | bead], cell):
         return None
-    if _has_step(s_m[known], e_m[known], board_m):
+    if _has_step(s_m[known], e_m[known]):
         return None
-    weights = _weights(s_m.tobytes(), known.tobytes(), bead.tobytes(), board_m)
+    weights = _weights(s_m.tobytes(), known.tobytes(), bead.tobytes())
     if weights is None:
         return None
     # Unknown cells have weight 0; their nan must not enter the products.
     e = np.where(known, e_m, 0.0)
     variance = np.where(known, sd_m, 0.0) ** 2
     gap, missed = np.full((2, len(s_m)), np.nan)
-    within = (known | bead) & (np.abs(s_m) <= board_m / 2 + 1e-9)
+    within = (known | bead) & (np.abs(s_m) <= BOARD_M / 2 + 1e-9)
     gap[within] = (weights @ e)[within]
     # Variance a^2 / 3 of a uniform distribution of half width a, the second difference / MISSED.
     missed[known] = _second_differences(s_m[known], e[known], variance[known]) / MISSED**2 / 3
     if bead.any():
         missed[bead] = _extrapolation_squares(s_m, e, bead, known, gap) / MISSED**2 / 3
     # The gap contains half of each end, hence a quarter of the variance of each end.
-    ends = [float(np.nanmean(missed[np.abs(s_m - at) <= END_M])) for at in _board_ends(board_m)]
+    ends = [float(np.nanmean(missed[np.abs(s_m - at) <= END_M])) for at in ENDS_M]
     missed = np.where(within, missed + sum(ends) / 4, np.nan)
     return BoardGaps(gap, np.where(within, weights**2 @ variance, np.nan), missed)
 
@@ -160,22 +159,17 @@ def bead_height(s_m, gap_m):
     return float(off[np.nanargmax(np.abs(off))])
 
 
-def _board_ends(board_m):
-    """Places of the two ends of the board, m."""
-    return -board_m / 2, board_m / 2
-
-
-def _has_no_hole(s_m, cell, reach_m):
+def _has_no_hole(s_m, cell):
     """Whether cells cover the reach on both sides of the weld without a hole."""
-    near = s_m[np.abs(s_m) <= reach_m + cell]
-    if len(near) < 3 or near[0] > cell - reach_m or near[-1] < reach_m - cell:
+    near = s_m[np.abs(s_m) <= REACH_M + cell]
+    if len(near) < 3 or near[0] > cell - REACH_M or near[-1] < REACH_M - cell:
         return False
     return np.diff(near).max() <= max(HOLE_M, 1.5 * cell)
 
 
-def _has_step(s_m, e_m, board_m):
+def _has_step(s_m, e_m):
     """Whether the wall under a board rises within two cells by more than a plate can."""
-    inside = np.abs(s_m) <= board_m / 2 + END_M
+    inside = np.abs(s_m) <= BOARD_M / 2 + END_M
     s, e = s_m[inside], e_m[inside]
     return any(
         np.any(np.abs(e[by:] - e[:-by]) > np.maximum(STEP_M, STEEP * (s[by:] - s[:-by])))
@@ -184,7 +178,7 @@ def _has_step(s_m, e_m, board_m):
 
 
 @lru_cache(maxsize=512)
-def _weights(s_bytes, known_bytes, bead_bytes, board_m):
+def _weights(s_bytes, known_bytes, bead_bytes):
     """Weights (n, n) of the deviations in the gaps, or None if an end of the board has no cells.
 
     The weights are cached because most boards have the same known cells.
@@ -192,7 +186,7 @@ def _weights(s_bytes, known_bytes, bead_bytes, board_m):
     s = np.frombuffer(s_bytes)
     known, bead = np.frombuffer(known_bytes, dtype=bool), np.frombuffer(bead_bytes, dtype=bool)
     cell = s[1] - s[0]
-    lines = [_line_at(s, known, at, max(END_M, 1.5 * cell)) for at in _board_ends(board_m)]
+    lines = [_line_at(s, known, at, max(END_M, 1.5 * cell)) for at in ENDS_M]
     if any(line is None for line in lines):
         return None
     weights = np.diag(known.astype(float))
@@ -203,7 +197,7 @@ def _weights(s_bytes, known_bytes, bead_bytes, board_m):
         weights[bead] = rows
     low, high = lines
     # g(s) of the module's docstring, with the two ends as straight lines.
-    return weights - (low + high) / 2 - s[:, None] * (high - low) / board_m
+    return weights - (low + high) / 2 - s[:, None] * (high - low) / BOARD_M
 
 
 def _line_at(s, known, at, reach):

@@ -337,7 +337,7 @@ def share_within(within, judged):
     return float(share), float(np.sqrt(variance))
 
 
-def exact_bounds(good, count, probability=BOUNDS):
+def exact_bounds(good, count):
     """Exact bounds of a probability, from `good` successes in `count` trials (Clopper and Pearson).
 
     Examples
@@ -347,7 +347,7 @@ def exact_bounds(good, count, probability=BOUNDS):
     """
     if not count:
         return None, None
-    tail = (1 - probability) / 2
+    tail = (1 - BOUNDS) / 2
     low = beta.ppf(tail, good, count - good + 1) if good else 0.0
     high = beta.ppf(1 - tail, good + 1, count - good) if good < count else 1.0
     return float(low), float(high)

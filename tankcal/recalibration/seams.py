@@ -36,6 +36,7 @@ WINDOW_M = 0.5  # half width of the window about a seam, beyond the farthest zer
 LARGEST_VOTE = 25.0  # cap on the chi2 of a seam
 FEWEST_ROWS_OF_WINDOW = 7  # fewest rows of a window
 MOST_ROWS_OF_WINDOW = 200  # largest number of rows used in a window
+MOST_ZEROS = 3  # largest number of candidates for the zero
 APART_M = 0.03  # smallest distance of candidates
 ROUNDING = 1e-11  # relative remainder of a ramp that the adjustment absorbs
 ADDING_WEIGHT = (
@@ -158,7 +159,7 @@ def _gains(dips, volumes, sds, seams, places):
 # ---- zero of the table
 
 
-def find_zeros(dips_m, volumes_m3, sd_m3, seams_m, most=3):
+def find_zeros(dips_m, volumes_m3, sd_m3, seams_m):
     """Dips of possible bottoms of the first ring, most likely first; (0.0,) if undetermined.
 
     Parameters
@@ -166,8 +167,6 @@ def find_zeros(dips_m, volumes_m3, sd_m3, seams_m, most=3):
     dips_m, volumes_m3, sd_m3 : (rows,) ndarray
     seams_m : (n,) ndarray
         Heights above the bottom of the first ring.
-    most : int
-        Largest number of candidates.
 
     Returns
     -------
@@ -184,7 +183,7 @@ def find_zeros(dips_m, volumes_m3, sd_m3, seams_m, most=3):
     for place in np.argsort(votes):
         if all(abs(zeros[place] - zero) >= APART_M for zero in candidates):
             candidates.append(float(zeros[place]))
-        if len(candidates) == most:
+        if len(candidates) == MOST_ZEROS:
             break
     return tuple(candidates)
 

@@ -530,7 +530,7 @@ def _wet_nodes(arc, level_m, slope, nodes):
     return row, begin + length * np.sin(angle) ** 2, length * (np.sin(2 * angle) * share)
 
 
-def revolved(arc, start, integrands, nodes=NODES):
+def revolved(arc, start, integrands):
     """Return integrals (integrands, rows) over x along an arc of revolution.
 
     Parameters
@@ -540,8 +540,6 @@ def revolved(arc, start, integrands, nodes=NODES):
         Parameters at which the integrals start, limited to the range of the arc.
     integrands : sequence of callable
         Functions of (arc, parameter).
-    nodes : int, optional
-        Gauss nodes.
 
     Returns
     -------
@@ -557,7 +555,7 @@ def revolved(arc, start, integrands, nodes=NODES):
     [[2.094395]]
     """
     begin = np.clip(np.asarray(start, dtype=float), arc.start, arc.stop)[:, None]
-    share, weight = panels((0.0, 1.0), nodes)
+    share, weight = panels((0.0, 1.0), NODES)
     parameter = begin + (arc.stop - begin) * share
     _, _, step = arc.at(parameter)
     weight = weight * (arc.stop - begin) * step

@@ -140,20 +140,20 @@ def decimals_of(u, *, significant=SIGNIFICANT, least=0):
     return _decimals(_exact(u if _is_number(u) else 0.0), significant, least)
 
 
-def round_u(u, *, significant=SIGNIFICANT):
+def round_u(u):
     """Round u to the printed value, such as 417 to 420; None if u is unknown."""
     if not _is_number(u):
         return None
     exact = _exact(u)
-    return float(_spread(exact, _decimals(exact, significant, None))) if exact else 0.0
+    return float(_spread(exact, _decimals(exact, SIGNIFICANT, None))) if exact else 0.0
 
 
-def bound_of_decimals(decimals, *, significant=SIGNIFICANT):
+def bound_of_decimals(decimals):
     """Return the bound of u below which `decimals_of` gives at least this number of decimals."""
-    return (10**significant - 0.5) / 10.0**decimals
+    return (10**SIGNIFICANT - 0.5) / 10.0**decimals
 
 
-def decimals_of_mantissa(value, u, *, significant=SIGNIFICANT):
+def decimals_of_mantissa(value, u):
     """Return the decimals of the mantissa of `value` that end at the last digit of u, at least 0.
 
     For number formats with a power of ten (1.742E-03). The result is UNKNOWN_DECIMALS if u is 0 or
@@ -161,7 +161,7 @@ def decimals_of_mantissa(value, u, *, significant=SIGNIFICANT):
     """
     if not (_is_number(u) and u and _is_number(value) and value):
         return UNKNOWN_DECIMALS
-    last = _decimals(_exact(u), significant, None)
+    last = _decimals(_exact(u), SIGNIFICANT, None)
     return max(_round(_exact(value), last).adjusted() + last, 0)
 
 

@@ -43,13 +43,13 @@ def has_app():
     return all(map(find_spec, ("voila", "ipywidgets", "anywidget")))
 
 
-def open_lab(notebook, is_browser=True):
+def open_lab(notebook):
     """Show a notebook in JupyterLab, on this machine only, until JupyterLab is stopped."""
     from jupyterlab.labapp import LabApp
 
     _speed_up_kernels()
     arguments = [str(notebook), f"--ServerApp.ip={HERE}", "--ServerApp.answer_yes=True"]
-    LabApp.launch_instance(arguments if is_browser else [*arguments, "--no-browser"])
+    LabApp.launch_instance(arguments)
 
 
 def serve_app(notebook, port, address=HERE, is_browser=True, token=""):

@@ -85,9 +85,7 @@ class PessoaRule:
     keep: tuple
 
 
-def silva_rule(
-    components, *, negligible_percent=NEGLIGIBLE_PERCENT, loading=LOADING, alike=ALIKE, stay=BASIC
-):
+def silva_rule(components, *, negligible_percent=NEGLIGIBLE_PERCENT, alike=ALIKE):
     """Apply Silva's rule to principal components.
 
     Parameters
@@ -96,12 +94,8 @@ def silva_rule(
         Principal components of the parameters.
     negligible_percent : float, optional
         Share below which a component is negligible, %.
-    loading : float, optional
-        Loading above which a parameter has a high loading.
     alike : float, optional
         Largest difference of loadings that count as equal.
-    stay : sequence of str, optional
-        Parameters that are always kept.
 
     Returns
     -------
@@ -112,7 +106,7 @@ def silva_rule(
     may_go = int(np.sum(share < negligible_percent))
     high, drop = [], []
     for number in range(len(names)):
-        rows = np.flatnonzero(sizes[:, number] > loading).tolist()
+        rows = np.flatnonzero(sizes[:, number] > LOADING).tolist()
         if len(rows) < 2:
             continue
         signed = components.loadings[:, number]
@@ -121,20 +115,20 @@ def silva_rule(
         )
         remaining = {names[i]: sizes[i, number] for i in rows if names[i] not in drop}
         while len(drop) < may_go and len(remaining) > 1:
-            dropped = _smallest(remaining, alike, stay)
+            dropped = _smallest(remaining, alike)
             if dropped is None:
                 break
             drop.append(dropped)
             del remaining[dropped]
-    return SilvaRule(may_go, tuple(drop), tuple(high), negligible_percent, loading, alike)
+    return SilvaRule(may_go, tuple(drop), tuple(high), negligible_percent, LOADING, alike)
 
 
-def _smallest(loadings, alike, stay):
+def _smallest(loadings, alike):
     """Name of the parameter with the smallest loading, of equal loadings the highest order.
 
-    None if all parameters are kept.
+    None if all parameters are always kept (BASIC).
     """
-    candidates = {name: size for name, size in loadings.items() if name not in stay}
+    candidates = {name: size for name, size in loadings.items() if name not in BASIC}
     if not candidates:
         return None
     least = min(candidates.values())

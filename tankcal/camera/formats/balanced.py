@@ -90,7 +90,7 @@ def _interior_of(camera):
     return interior, Form(camera.convention, "b1_b2", float(camera.values["R0"]))
 
 
-def convert_to_balanced(camera, radius_mm, convention="distortion_of_ideal", covariance=None):
+def convert_to_balanced(camera, radius_mm, covariance=None):
     """Convert a FramedCamera, exactly for K4 = P3 = P4 = 0 and a suitable convention.
 
     Parameters
@@ -99,8 +99,6 @@ def convert_to_balanced(camera, radius_mm, convention="distortion_of_ideal", cov
         The camera.
     radius_mm : float
         R0, mm; 0 without a balance.
-    convention : str, optional
-        One of CONVENTIONS_OF.
     covariance : array_like, shape (13, 13), optional
         Covariance of camera.interior.
 
@@ -108,6 +106,7 @@ def convert_to_balanced(camera, radius_mm, convention="distortion_of_ideal", cov
     -------
     Balanced
     """
+    convention = "distortion_of_ideal"
     form = Form(convention, "b1_b2", float(radius_mm))
     converted = convert_camera(
         camera.interior, camera.form, form, camera.size_px, camera.pixel_mm, USUAL, covariance

@@ -168,11 +168,11 @@ def short_text(value):
     return text if len(text) <= 40 else text[:37] + "..."
 
 
-def make_valid_name(text, instead="camera"):
-    """Valid name derived from a file name, or `instead` if no valid character remains."""
+def make_valid_name(text):
+    """Valid name derived from a file name, or "camera" if no valid character remains."""
     # Characters outside the rules for names become underscores.
     name = re.sub(r"[^\w .()/#-]", "_", text).strip(" ._-()/#")[:MAX_NAME]
-    return name or instead
+    return name or "camera"
 
 
 def exact_text(value):

@@ -58,9 +58,9 @@ def _page(paper, blocks):
     return page([block.data for block in (first, *blocks)], has_contents=False)
 
 
-def frame_html(html, title, height=HEIGHT):
+def frame_html(html, title):
     """HTML of a frame that contains a page."""
-    style = f"box-sizing:border-box;width:100%;height:{height};border:1px solid #c3cad2"
+    style = f"box-sizing:border-box;width:100%;height:{HEIGHT};border:1px solid #c3cad2"
     return (
         f'<iframe sandbox="allow-scripts" title="{escape(title)}" style="{style}" '
         f'srcdoc="{escape(html)}"></iframe>'
