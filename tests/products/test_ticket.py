@@ -158,10 +158,12 @@ def test_intervals_of_transfers_hold():
 
 
 @pytest.mark.study
-def test_intervals_of_transfers_hold_study(figure):
+@pytest.mark.parametrize("is_density_shared", [True, False], ids=["shared", "own density"])
+def test_intervals_of_transfers_hold_study(figure, is_density_shared):
     count = draws(1000, 10_000)
-    share = simulate_transfers(count, 2)
-    figure(f"NSV of {count} transfers held", f"{share:.4f}")
+    share = simulate_transfers(count, 2, is_density_shared=is_density_shared)
+    density = "shared density" if is_density_shared else "a density of its own in each gauging"
+    figure(f"NSV of {count} transfers held, {density}", f"{share:.4f}")
     assert abs(share - 0.95) < 0.01 + 3 * np.sqrt(0.95 * 0.05 / count)
 
 

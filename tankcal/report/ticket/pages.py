@@ -36,7 +36,7 @@ def pages(paper, folder=None, whole=False):
     return [
         *paper.head(folder),
         blocks.side_by_side(_show_facts(paper, _head(paper))),
-        blocks.result(_label(paper), _result(paper), comparison_text(paper)),
+        blocks.result(label_text(paper), result_text(paper), comparison_text(paper)),
         paper.show(RESULTS, result_rows(paper)),
         paper.facts(_gaugings(paper)),
         blocks.side_by_side(paper.facts(_properties(paper))),
@@ -79,13 +79,13 @@ def _show_facts(paper, facts):
     )
 
 
-def _label(paper):
+def label_text(paper):
     """Return the name of the main result and its state."""
     quantity, state = paper.words["quantities"]["nsv_m3"], paper.words["states"][paper.state]
     return f"{quantity[0].upper()}{quantity[1:]} (NSV), {state}"
 
 
-def _result(paper):
+def result_text(paper):
     """Return the net standard volume with U, k and probability."""
     saved = paper.quantity(paper.state, "nsv_m3")
     written = format_with_u(saved["value"], saved["U"], paper.marks)

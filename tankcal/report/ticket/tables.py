@@ -244,7 +244,7 @@ BUDGET = Table(
         Column("u_input", text=_u_of_input, sheet=True, width=14,
                align="right"),
         Column("origin", text=origin_text, sheet=True, width=16),
-        Column("contribution", decimals=3, csv="contribution", sheet=True, width=14,
+        Column("contribution", decimals=3, csv="contribution", sheet="contribution", width=14,
                in_sheet={"decimals": 6}),
         Column("share", "share", decimals=1, csv="share", sheet=True),
     ),

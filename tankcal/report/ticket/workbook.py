@@ -1,9 +1,21 @@
 """Workbook of a ticket: result, steps, quantities, budgets and uncertainties as numbers."""
 
-from tankcal.report.ticket.pages import notes, warnings_text
+from tankcal.report.ticket.pages import (
+    comparison_text,
+    label_text,
+    notes,
+    result_text,
+    warnings_text,
+)
 from tankcal.report.ticket.tables import BUDGET, QUANTITIES, STEPS, UNCERTAINTIES
 from tankcal.report.workbook.book import workbook_head
-from tankcal.report.workbook.sections import Sentences, SheetContent, cell_table, write_workbook
+from tankcal.report.workbook.sections import (
+    FIRST_LINE,
+    Sentences,
+    SheetContent,
+    cell_table,
+    write_workbook,
+)
 
 
 def write(paper, path):
@@ -17,9 +29,13 @@ def write(paper, path):
 
 def sheets(book):
     """Yield the content of each sheet, in order."""
-    texts = filter(None, [warnings_text(book.paper), *notes(book.paper)])
-    yield SheetContent("steps", [cell_table(book, STEPS), Sentences([*texts])],
-                       tab="result")  # fmt: skip
+    paper = book.paper
+    result = f"{label_text(paper)}: {result_text(paper)}"
+    texts = filter(None, [warnings_text(paper), *notes(paper)])
+    compared = filter(None, [comparison_text(paper)])
+    head = Sentences([result], look=FIRST_LINE), Sentences([*compared])
+    sections = [head, cell_table(book, STEPS), Sentences([*texts])]
+    yield SheetContent("steps", sections, tab="result")
     yield SheetContent("quantities", [cell_table(book, QUANTITIES)], tab="result")
     yield SheetContent("budget", [cell_table(book, BUDGET)], is_filtered=True)
     yield SheetContent("uncertainties", [cell_table(book, UNCERTAINTIES)], tab="input")
