@@ -30,7 +30,7 @@ def write(paper, path):
 def sheets(book):
     """Yield the content of each sheet, in order."""
     paper = book.paper
-    result = f"{label_text(paper)}: {result_text(paper)}"
+    result = ": ".join([label_text(paper), result_text(paper)])
     texts = filter(None, [warnings_text(paper), *notes(paper)])
     compared = filter(None, [comparison_text(paper)])
     head = Sentences([result], look=FIRST_LINE), Sentences([*compared])
