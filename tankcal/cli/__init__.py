@@ -63,6 +63,7 @@ the job format: docs/job-format.md; axes, signs and units: docs/conventions.md""
 
 def main(arguments=None):
     """Run the command line and return the exit status."""
+    _open_closed_streams()
     _print_in_any_encoding()
     speak()
     with _translate_argparse(words_of_run()):
@@ -113,10 +114,18 @@ def _find_status(error):
     raise error
 
 
+def _open_closed_streams():
+    """Replace standard streams that the caller closed (None) by the null device."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # open to the end
+
+
 def _print_in_any_encoding():
     """Escape characters that the terminal or file cannot encode: cp1252 on Windows, ASCII."""
     for stream in (sys.stdout, sys.stderr):
-        if getattr(stream, "errors", None) == "strict":
+        # "surrogateescape" is the setting of Python in the locale C
+        if getattr(stream, "errors", None) in ("strict", "surrogateescape"):
             stream.reconfigure(errors="backslashreplace")
 
 

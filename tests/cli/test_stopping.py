@@ -1,5 +1,6 @@
 """A command that ends early: what it says, its exit status, and what it leaves."""
 
+import io
 import json
 import os
 import shutil
@@ -166,6 +167,23 @@ def test_want_of_memory_has_its_line(monkeypatch, capsys, error):
     monkeypatch.setattr("tankcal.cli.running.prepare_for_small_work", fail)
     assert main(["demo", "--quiet"]) == 2
     assert "not enough memory" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["stdin", "stdout", "stderr"])
+def test_closed_streams_are_no_error(name, tmp_path, monkeypatch):
+    """`>&-` of a shell, or a program without a terminal: Python has None for the stream."""
+    monkeypatch.setattr(sys, name, None)
+    assert main(["lint", str(tmp_path / "nowhere.csv"), "--json"]) == 2
+
+
+def test_letters_in_the_locale_c(monkeypatch, tmp_path):
+    """There Python escapes only undecodable bytes, not the letters that ASCII lacks."""
+    output = io.BytesIO()
+    stream = io.TextIOWrapper(output, encoding="ascii", errors="surrogateescape")
+    monkeypatch.setattr(sys, "stderr", stream)
+    assert main(["lint", str(tmp_path / "não.csv"), "--language", "pt-BR"]) == 2
+    stream.flush()
+    assert b"n\\xe3o.csv" in output.getvalue()
 
 
 @pytest.mark.slow
