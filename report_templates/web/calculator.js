@@ -21,7 +21,8 @@ function whenDipChanges(tell) {
   const simulated = unpacked(data.simulated, Uint8Array);
   const last = heights.length - 1;
   const top = Math.max(heights[last], Number(heights[last].toFixed(3))); // as a tape shows it
-  const uncertaintyBetween = deliveryUncertainty(data.deliveries, heights);
+  const covariance = covarianceOfTable(data.deliveries, heights);
+  const uncertaintyBetween = deliveryUncertainty(covariance);
   const field = (id) => document.getElementById(id);
   const height = (value) => fixed(value, decimalsOfHeight(value));
   const metres = (value) => `${height(value)}\u00a0m`;

@@ -1,7 +1,7 @@
 // The uncertainty of the volume between two dips, from the covariance factor of the table.
 
-/** A function (low, high) of two reads of the table to {u, k}; see tankcal/tank/deliveries.py. */
-function deliveryUncertainty(data, heights) {
+/** The covariance factor of the table: its columns at a height, their dof, and k. */
+function covarianceOfTable(data, heights) {
   const kept = unpacked(data.rows, Uint32Array);
   const factor = unpacked(data.factor, Float32Array);
   const nodes = unpacked(data.k.inverse_dof, Float64Array);
@@ -37,17 +37,25 @@ function deliveryUncertainty(data, heights) {
     return Math.exp(above / below);
   };
 
-  return (low, high) => {
-    const [one, other] = [columnsAt(low), columnsAt(high)];
+  /** Sum of squares of columns, and 1/dof by Welch-Satterthwaite. */
+  const combine = (columns) => {
     const bySource = data.dof.map(() => 0);
-    one.forEach((value, column) => {
-      bySource[data.source[column]] += (other[column] - value) ** 2;
-    });
+    columns.forEach((value, column) => { bySource[data.source[column]] += value ** 2; });
     const variance = bySource.reduce((sum, value) => sum + value, 0);
     const quartic = bySource.reduce((sum, value, source) =>
       sum + (data.dof[source] === null ? 0 : value ** 2 / data.dof[source]), 0);
-    const inverse = variance > 0 ? quartic / variance ** 2 : 0;
     const widest = data.k.least_dof === null ? 0 : 1 / data.k.least_dof;
-    return { u: Math.sqrt(variance), k: coverage(Math.min(inverse, widest)) };
+    const inverse = variance > 0 ? Math.min(quartic / variance ** 2, widest) : 0;
+    return { variance, inverse };
+  };
+  return { columnsAt, coverage, combine, inverseDof: (columns) => combine(columns).inverse };
+}
+
+/** A function (low, high) of two reads of the table to {u, k}; see tankcal/tank/deliveries.py. */
+function deliveryUncertainty({ columnsAt, coverage, combine }) {
+  return (low, high) => {
+    const [one, other] = [columnsAt(low), columnsAt(high)];
+    const { variance, inverse } = combine(one.map((value, column) => other[column] - value));
+    return { u: Math.sqrt(variance), k: coverage(inverse) };
   };
 }

@@ -11,11 +11,11 @@ import numpy as np
 import openpyxl
 import pytest
 from calculated_tanks import afloat, example_with_rows
+from quantity_cases import CASES, GRID, STEPS, U_KEYS, ULLAGES, case, ticket_of
 from recalculation import recalculated
 
 from tankcal.errors import InputError
 from tankcal.products.quantity.chain import QUANTITIES
-from tankcal.products.quantity.reading import read_tickets
 from tankcal.products.quantity.table import read_table
 from tankcal.report.workbook.book import Book
 from tankcal.report.workbook.calculator import factor_sheet
@@ -23,7 +23,6 @@ from tankcal.report.workbook.capacity import capacity_sheet
 from tankcal.report.workbook.quantity import quantity_sheets
 from tankcal.report.workbook.quantity.form import FORM, KEYS
 from tankcal.report.workbook.quantity.uncertainty import QUANTITIES as OF_SHEET
-from tankcal.tank.gauging import UNCERTAINTIES
 from tankcal.text.words import load_words, translate_record
 
 # openpyxl does not know our data bars, and says so each time
@@ -35,106 +34,6 @@ WORDS = load_words("en")
 CHOICES = WORDS["quantity"]["choices"]
 SAME = 1e-9
 OF_LIST = {"CNP-6-70": "cnp", "CNP-6-70-unrounded": "cnp_unrounded", "coefficient": "constant"}
-STEPS = {
-    "tov": "tov_m3", "fw": "fw_m3", "ctsh": "ctsh", "vcf": "vcf", "fra": "fra_m3", "gov": "gov_m3",
-    "gsv": "gsv_m3", "csw": "csw", "nsv": "nsv_m3", "mass": "mass_kg", "weight": "weight_kg",
-    "rho_t": "observed_density", "shell": "shell_c", "air": "air_factor",
-}  # fmt: skip
-U_KEYS = {
-    "u_dip_mm": "u_dip", "u_tape_ppm": "u_tape", "u_water_dip_mm": "u_water",
-    "u_temperature_k": "u_temperature", "u_thermometer_k": "u_thermometer",
-    "u_ambient_k": "u_ambient", "u_density_kg_m3": "u_density", "u_sw_percent": "u_sw",
-    "u_vcf_percent": "u_vcf", "u_expansion_per_k": "u_expansion",
-}  # fmt: skip
-
-OPENING = {"dip_m": 2.317, "water_dip_m": 0.412, "temperature_c": 18.4, "ambient_c": 25.0}
-CLOSING = {"dip_m": 8.642, "water_dip_m": 0.512, "temperature_c": 31.2, "ambient_c": 29.0}
-
-
-def case(correction, density, *, opening=OPENING, closing=CLOSING, shell=None, u=None, **product):
-    sections = {
-        "product": {
-            "correction": correction, "density_kg_m3": density, "density_is": "base",
-            "sw_percent": 0.05, **product,
-        },
-        "closing": closing,
-    }  # fmt: skip
-    if opening:
-        sections["opening"] = opening
-    return sections | ({"shell": shell} if shell else {}) | ({"uncertainty": u} if u else {})
-
-
-def observed(celsius, hydrometer=None):
-    keys = {"density_is": "observed", "density_temperature_c": celsius}
-    return keys | ({"hydrometer": hydrometer} if hydrometer else {})
-
-
-COLD = {"dip_m": 5.0, "temperature_c": -12.5, "ambient_c": -20.0}
-HOT = {"dip_m": 9.2001, "temperature_c": 58.3, "ambient_c": 33.0}
-GRID = {
-    f"{edition} {group} {base} {density} {kind}": case(
-        edition, density, group=group, base=base, **more
-    )
-    for edition in ("D1250-04", "D1250-80")
-    for group, densities in (
-        ("crude", (680.0, 874.3)),
-        ("products", (735.2, 779.0, 801.7, 842.0, 985.0)),
-        ("lubricants", (880.0,)),
-    )
-    for density in densities
-    for base, kind, more in (
-        ("15C", "base", {}),
-        ("20C", "observed", observed(27.5, "glass 20C")),
-        ("60F", "observed", observed(8.0)),
-    )
-}
-CASES = {
-    "D1250-04 products": case("D1250-04", 842.0, group="products", base="20C",
-                              **observed(27.5, "glass 20C")),
-    "D1250-80 products": case("D1250-80", 735.2, group="products", base="60F", **observed(8.0)),
-    "D1250-80 crude": case("D1250-80", 874.3, group="crude", base="20C", **observed(27.5)),
-    "coefficient group": case("D1250-04", 850.0, group="coefficient", alpha_per_k=8e-4, base="15C"),
-    "coefficient group 80": case(
-        "D1250-80", 850.0, group="coefficient", alpha_per_k=8e-4, base="20C", **observed(31.0)
-    ),
-    "coefficient group 60F": case(
-        "D1250-80", 850.0, group="coefficient", alpha_per_k=8e-4, base="60F", **observed(31.0)
-    ),
-    "coefficient": case("coefficient", 1010.0, alpha_per_k=4e-4, base="15C"),
-    "coefficient seen": case("coefficient", 1010.0, alpha_per_k=4e-4, base="20C",
-                             **observed(33.0, "glass 15C")),
-    "cnp": case("CNP-6-70", 837.0),
-    "cnp half": case("CNP-6-70", 841.0, **observed(24.5)),
-    "cnp light": case("CNP-6-70", 601.0, **observed(12.5, "glass 15C")),
-    "cnp exact": case("CNP-6-70-unrounded", 742.0),
-    "cnp exact seen": case("CNP-6-70-unrounded", 995.9, **observed(35.0, "glass 60F")),
-    "stock": case("D1250-04", 842.0, opening=None, group="products", base="20C"),
-    "no water, no S&W": case("D1250-04", 842.0, opening=COLD, closing=HOT, group="products",
-                             base="20C", sw_percent=None),
-    "emptied": case("D1250-04", 842.0, opening=CLOSING, closing=OPENING, group="crude",
-                    base="15C"),
-    "insulated": case("D1250-80", 842.0, group="products", base="15C", shell={"insulated": True},
-                      opening={"dip_m": 3.0, "temperature_c": 22.0},
-                      closing={"dip_m": 4.0, "temperature_c": 24.0}),
-    "own u": case("D1250-04", 842.0, group="products", base="20C",
-                  u={name: 0.3 if value is None else 1.7 * value
-                     for name, value in UNCERTAINTIES.items()}),
-    "low water": case("D1250-04", 842.0, group="products", base="20C",
-                      closing=CLOSING | {"water_dip_m": 0.0}),
-    "a row, and no expansion": case("D1250-04", 842.0, group="products", base="20C",
-                                    closing=CLOSING | {"dip_m": 8.0}),
-}  # fmt: skip
-ULLAGES = {
-    "ullage": case("D1250-04", 842.0, group="products", base="20C",
-                   opening={"ullage_m": 7.1, "temperature_c": 25.0, "ambient_c": 20.0},
-                   closing=CLOSING | {"water_dip_m": 0.1}),
-    "afloat": case("D1250-80", 745.0, group="products", base="15C", **observed(30.0),
-                   opening={"dip_m": 4.111, "temperature_c": 25.0, "ambient_c": 20.0},
-                   closing={"dip_m": 9.0, "temperature_c": 28.0, "ambient_c": 20.0}),
-    "afloat cnp": case("CNP-6-70", 745.0,
-                       opening={"dip_m": 4.111, "temperature_c": 25.0, "ambient_c": 20.0},
-                       closing={"dip_m": 9.0, "temperature_c": 28.0, "ambient_c": 20.0}),
-}  # fmt: skip
 
 
 def cells_of(sections):
@@ -160,18 +59,6 @@ def cells_of(sections):
     for name, value in sections.get("uncertainty", {}).items():
         cells[U_KEYS[name]] = value
     return cells
-
-
-def ticket_of(sections, folder, table):
-    lines = []
-    for section, keys in sections.items():
-        lines.append(f"[{section}]")
-        for key, value in keys.items():
-            if value is not None:
-                lines.append(f"{key} = {json.dumps(value)}")
-    path = folder / "ticket.toml"
-    path.write_text("\n".join(lines), encoding="utf-8")
-    return read_tickets(table, path)
 
 
 def write_form(record, path, language="en"):

@@ -176,6 +176,9 @@ def test_the_critical_zone_of_a_roof_is_refused(browser, example_record, record,
     roof = [
         {"code": "roof_critical_bottom", "value": 1.0, "unit": "m"},
         {"code": "roof_critical_top", "value": 1.6, "unit": "m"},
+        {"code": "roof_mass", "value": 42_000.0, "unit": "kg"},
+        {"code": "roof_reference_density", "value": 850.0, "unit": "kg/m3"},
+        {"code": "roof_weighing", "value": "air", "unit": None},
     ]
     path = tmp_path / "record.json"
     path.write_text(json.dumps({**record, "roof": roof}), encoding="utf-8")

@@ -28,6 +28,11 @@ def roof_of(record):
     return {line["code"]: line["value"] for line in record["roof"]}
 
 
+def is_roof_in_table(record):
+    """Whether the table contains the displacement of the floating roof."""
+    return all(choice["value"] != "off" for choice in record["choices"] if choice["code"] == "roof")
+
+
 def groups_of(kinds, lines):
     """Return the sources of the columns of the covariance factor.
 

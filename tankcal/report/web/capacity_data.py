@@ -13,6 +13,7 @@ from tankcal.report.numbers import unit
 from tankcal.report.uncertainty.sources import critical_zone, groups_of
 from tankcal.report.uncertainty.stated import flag_simulated, stated_rows, stated_U_m3
 from tankcal.report.web.packing import pack_numbers
+from tankcal.report.web.quantity_data import quantity_data
 from tankcal.text.digits import decimals_of_rows
 from tankcal.uncertainty import coverage_factor
 
@@ -44,6 +45,7 @@ def calculator(paper):
             "decimals": pack_numbers(decimals_of_rows(U), "u1"),
             "simulated": pack_numbers(flag_simulated(capacity), "u1"),
             "deliveries": _deliveries(record, shown.factor),
+            "quantity": quantity_data(record),
         }
     )
 

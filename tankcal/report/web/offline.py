@@ -17,7 +17,7 @@ from tankcal.text.words import load_words
 _SCRIPTS = {  # scripts of each kind of block; "": scripts of every page
     "": ("numbers.js", "look.js"),
     "columns_table": ("finder.js",),
-    "calculator": ("deliveries.js", "calculator.js"),
+    "calculator": ("deliveries.js", "calculator.js", "quantity.js", "quantity_form.js"),
     "cloud_map": ("ramp.js", "map.js"),
     "wall_map": ("ramp.js", "chosen.js", "wall.js"),
     "tank_view": ("chosen.js", "matrices.js", "meshes.js", "scene.js", "view.js"),
@@ -37,6 +37,9 @@ def page(blocks, has_contents=True):
     script = "".join(_template(f"web/{name}") for name in _scripts_for(blocks))
     script = f'"use strict";\n{{\n{script}}}\n'
     spoken = {"words": words["web"], "marks": words["language"]["marks"]}
+    if any(block["kind"] == "calculator" for block in blocks):
+        spoken["quantity"] = words["quantity"]
+        spoken["refused"] = words["calculator"]["texts"]["refused"]
     return "\n".join(
         [
             "<!DOCTYPE html>",
@@ -224,6 +227,7 @@ def calculator_html(block, words):
         f'<h3 id="{block["id"]}">{escape(words["calculator"])}</h3>'
         f'<div class="fields">{fields}</div><div class="answers">{results}</div>'
         f'<p class="note">{escape(words["calculator_note"])}</p>'
+        '<details id="quantity" hidden></details>'
         f"{_data('calculator', data)}</section>"
     )
 

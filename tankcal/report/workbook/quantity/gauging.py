@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from tankcal.report.uncertainty.sources import roof_of
+from tankcal.report.uncertainty.sources import is_roof_in_table, roof_of
 from tankcal.report.workbook.quantity.correction import FACTORS, TYPED, factor_rows
 from tankcal.report.workbook.quantity.rows import NONE, fault, first_true, state_row
 from tankcal.tank.fittings import AIR_KG_M3, WEIGHTS_KG_M3
@@ -62,11 +62,6 @@ def _levels(record, number):
     opening, closing = states.cells
     closing = replace(closing, formula=closing.formula.replace(f"#{BLANK[0]}", f"#{BLANK[1]}"))
     return [state_row("level", "h", level, 0), replace(states, cells=(opening, closing))]
-
-
-def is_roof_in_table(record):
-    """Whether the table contains the displacement of the floating roof."""
-    return all(choice["value"] != "off" for choice in record["choices"] if choice["code"] == "roof")
 
 
 def _interpolate(key, level, symbol):

@@ -1,0 +1,387 @@
+// From two dips to the quantity of product, as tankcal/products/quantity; no part of the page.
+
+const { quantityOf, Refusal } = (() => {
+// A number with its derivatives by named inputs. They go through every step of the calculation.
+const lift = (x) => (typeof x === "number" ? { value: x, slopes: {} } : x);
+const input = (value, ...names) => ({ value, slopes: Object.fromEntries(names.map((name) => [name, 1])) });
+
+/** A number whose derivatives are those of its parts [number, factor], summed. */
+function derived(value, parts) {
+  const slopes = {};
+  for (const [part, factor] of parts) {
+    for (const name of Object.keys(part.slopes)) {
+      slopes[name] = (slopes[name] ?? 0) + factor * part.slopes[name];
+    }
+  }
+  return { value, slopes };
+}
+
+const plus = (a, b) => ([a, b] = [lift(a), lift(b)], derived(a.value + b.value, [[a, 1], [b, 1]]));
+const minus = (a, b) => ([a, b] = [lift(a), lift(b)], derived(a.value - b.value, [[a, 1], [b, -1]]));
+const times = (a, b) => ([a, b] = [lift(a), lift(b)],
+  derived(a.value * b.value, [[a, b.value], [b, a.value]]));
+const over = (a, b) => ([a, b] = [lift(a), lift(b)],
+  derived(a.value / b.value, [[a, 1 / b.value], [b, -a.value / b.value ** 2]]));
+const exponential = (a) => derived(Math.exp(a.value), [[a, Math.exp(a.value)]]);
+const less1 = (a) => derived(Math.expm1(a.value), [[a, Math.exp(a.value)]]);
+const product = (...factors) => factors.reduce(times);
+const sum = (...terms) => terms.reduce(plus);
+
+/** A refusal: the key of its sentence, and the place: "product", "opening" or "closing". */
+class Refusal extends Error {
+  constructor(key, place = "product") {
+    super(key);
+    Object.assign(this, { key, place });
+  }
+}
+
+const MOST_ROUNDS = 200; // of iterations for the density at the base
+const ROUNDS_OF_GROUPS = 30; // later rounds keep the group, so that it cannot alternate
+const CONVERGED = 1e-13; // relative
+const ROUNDS_OF_SLOPES = 12; // derivatives converge as values do, some rounds later
+const BASES_C = { "15C": 15, "20C": 20, "60F": 28 / 1.8 };
+
+/** Polynomial with coefficients from the highest power. */
+const horner = (coefficients, x) => coefficients.reduce((total, c) => plus(times(total, x), c), 0);
+
+function glassCorrection(celsius, scale) {
+  if (scale === "60F") {
+    const step = 1.8 * (celsius - BASES_C["60F"]);
+    return 1 - 0.00001278 * step - 0.0000000062 * step ** 2;
+  }
+  const step = celsius - BASES_C[scale];
+  return 1 - 0.000023 * step - 0.00000002 * step ** 2;
+}
+
+/** The root of density = next(density, group), with its derivatives. */
+function iterate(start, next) {
+  let [density, bound, after] = [start, null, 0];
+  for (let round = 0; round < MOST_ROUNDS; round++) {
+    const before = density.value;
+    density = next(density, bound);
+    if (round === ROUNDS_OF_GROUPS) bound = density.value;
+    if (!Number.isFinite(density.value)) break;
+    if (Math.abs(density.value - before) <= CONVERGED * Math.abs(density.value)) {
+      after += 1;
+      if (after > ROUNDS_OF_SLOPES) return density;
+    } else after = 0;
+  }
+  throw new Refusal("no_base_density");
+}
+
+/** D1250 of 1980 or 2004 at one base: through the density at 15 degC or 60 degF. */
+function petroleum(constants, { edition, group, base, alpha }) {
+  const is2004 = edition === "D1250-04";
+  const form = is2004 ? "2004" : base === "60F" ? "60F" : "15C";
+  const [delta, degree] = [is2004 ? constants.delta_60 : 0, form === "15C" ? 1 : 1.8];
+  const parts = group === "coefficient" ? null : constants.groups[form][group];
+
+  const steps = (t) => {
+    if (form === "15C") return minus(t, 15);
+    if (form === "60F") return times(1.8, minus(t, BASES_C["60F"]));
+    const tau = over(t, 630);
+    const shift = horner([...constants.scales.slice().reverse(), 0], tau);
+    return minus(plus(times(1.8, minus(t, shift)), 32), constants.zero_68_f);
+  };
+  const expansion = (density, bound) => {
+    const at = bound ?? density.value;
+    const [, k0, k1, k2] = parts.find(([high], place) => at <= high || place === parts.length - 1);
+    const a = plus(over(plus(over(k0, density), k1), density), k2);
+    return { a, k0, k1, k2 };
+  };
+  const logFactor = (density, t, bound) => {
+    let a = lift((alpha ?? 0) / degree);
+    if (parts) {
+      const { a: raw, k0, k1, k2 } = expansion(density, bound);
+      const half = times(delta / 2, raw);
+      const b = over(plus(2 * k0, times(k1, density)),
+        plus(k0, times(plus(k1, times(k2, density)), density)));
+      const rise = less1(times(half, plus(1, times(0.8, half))));
+      const below = plus(1, product(half, plus(1, times(1.6, half)), b));
+      const star = times(density, plus(1, over(rise, below)));
+      a = plus(over(plus(over(k0, star), k1), star), k2);
+    }
+    const step = steps(lift(t));
+    return times(-1, product(a, step, plus(1, product(0.8, a, plus(step, delta)))));
+  };
+  const root = (density, t) => iterate(density, (rho, bound) =>
+    times(density, exponential(times(-1, logFactor(rho, t, bound)))));
+
+  const least = parts ? constants.least[form][group] : 0;
+  const most = parts ? parts.at(-1)[0] : Infinity;
+  const limits = (density) => {
+    if (is2004) return constants.limits_2004_c;
+    const [light, middle, heavy] = constants.highest_f;
+    const high = density < constants.light ? light : density < constants.middle ? middle : heavy;
+    return [(constants.lowest_f - 32) / 1.8, (high - 32) / 1.8];
+  };
+  return {
+    base_c: BASES_C[base],
+    densities: [least, most],
+    limits,
+    baseDensity: (density, t) => {
+      const rho = root(density, t);
+      return times(rho, exponential(logFactor(rho, BASES_C[base])));
+    },
+    factor: (density, t) => {
+      const rho = root(density, BASES_C[base]);
+      return exponential(minus(logFactor(rho, t), logFactor(rho, BASES_C[base])));
+    },
+  };
+}
+
+/** The tables of Brazil, CNP 6/70, through their fit. */
+function brazil(constants, isRounded) {
+  const { classes, least, most, limits_c: limits, three_to: threeTo, four_from: fourFrom } = constants;
+  const classOf = (relative) => classes.find(([high], place) =>
+    relative <= high || place === classes.length - 1).slice(1);
+  const fit = (relative, t) => {
+    const [p1, p2, p3, p4] = classOf(lift(relative).value);
+    const x = minus(t, 20);
+    return sum(1, times(p2, x), product(p4, x, x), over(plus(times(p1, x), product(p3, x, x)), relative));
+  };
+  /** To the nearest whole number, a half to the even one. */
+  const even = (value) => {
+    const whole = Math.round(value);
+    return Math.abs(value % 1) === 0.5 && whole % 2 !== 0 ? whole - 1 : whole;
+  };
+  return {
+    base_c: 20,
+    glass_scale: "20C",
+    densities: [1000 * least, 1000 * most],
+    limits: () => limits,
+    baseDensity: (density, t) => {
+      const seen = over(density, 1000);
+      const x = t - 20;
+      return times(1000, iterate(seen, (rho, bound) => {
+        const [p1, p2, p3, p4] = classOf(bound ?? rho.value);
+        return times(glassCorrection(t, "20C") / (1 + p2 * x + p4 * x ** 2),
+          minus(seen, p1 * x + p3 * x ** 2));
+      }));
+    },
+    factor: (density, t) => {
+      const relative = over(density, 1000);
+      const unrounded = fit(relative, lift(t));
+      if (!isRounded) return unrounded;
+      const isLight = relative.value <= threeTo;
+      if (!isLight && relative.value < fourFrom) throw new Refusal("cnp_decimals");
+      const ninth = Math.round((relative.value / 0.002) * 1e9) / 1e9;
+      const decimals = isLight ? 3 : 4;
+      const value = fit(0.002 * even(ninth), lift(t)).value;
+      return { value: Number(value.toFixed(decimals)), slopes: unrounded.slopes };
+    },
+  };
+}
+
+function constant(alpha, base, limits) {
+  const factor = (density, t) => over(1, plus(1, times(alpha, minus(t, BASES_C[base]))));
+  return {
+    base_c: BASES_C[base],
+    densities: [0, Infinity],
+    limits: () => limits,
+    baseDensity: (density, t) => over(density, factor(null, lift(t))),
+    factor,
+  };
+}
+
+/** The volume correction of the chosen product; a Refusal for an incomplete choice. */
+function correctionOf(constants, given) {
+  const { correction, group, base, alpha } = given;
+  const hasGroup = correction.startsWith("D1250");
+  const needsAlpha = correction === "coefficient" || (hasGroup && group === "coefficient");
+  if (!correction) throw new Refusal("correction_blank");
+  if (hasGroup && !group) throw new Refusal("group_blank");
+  if (!hasGroup && group) throw new Refusal("group_unused");
+  if ((hasGroup || correction === "coefficient") && !base) throw new Refusal("base_blank");
+  if (correction.startsWith("CNP") && base && base !== "20C") throw new Refusal("base_other");
+  if (!needsAlpha && alpha !== null) throw new Refusal("alpha_unused");
+  if (needsAlpha) {
+    const [low, high] = correction === "coefficient" ? [1e-9, 0.01] : constants.alpha[correction];
+    if (!(alpha >= low && alpha <= high)) throw new Refusal("alpha_range");
+  }
+  if (hasGroup) return petroleum(constants, { edition: correction, group, base, alpha });
+  if (correction === "coefficient") return constant(alpha, base, constants.constant_c);
+  return brazil(constants.brazil, correction === "CNP-6-70");
+}
+
+/** Volume of the table at a dip, linear between rows; the level has derivatives. */
+function tableVolume({ heights, volumes }, level) {
+  let row = 0;
+  let end = heights.length - 2;
+  while (row < end) {
+    const middle = (row + end + 1) >> 1;
+    if (heights[middle] <= level.value) row = middle;
+    else end = middle - 1;
+  }
+  const slope = (volumes[row + 1] - volumes[row]) / (heights[row + 1] - heights[row]);
+  const part = (level.value - heights[row]) / (heights[row + 1] - heights[row]);
+  const volume = volumes[row] + part * (volumes[row + 1] - volumes[row]);
+  return { row, volume: derived(volume, [[level, slope]]) };
+}
+
+function shellFactor(tank, level, shell, expansion) {
+  const step = times(expansion, minus(shell, tank.temperature_c));
+  if (tank.kind === "vertical") return sum(1, times(2, step), times(step, step));
+  const stretch = plus(1, step);
+  const cold = minus(over(plus(level, tank.zero_m), stretch), tank.zero_m);
+  const { volume } = tableVolume(tank, level);
+  if (!(volume.value > 0)) return lift(1);
+  return over(product(stretch, stretch, stretch, tableVolume(tank, cold).volume), volume);
+}
+
+/** Volume displaced by the floating roof at a density. */
+const displacement = (roof, density) => over(
+  roof.mass_kg * (1 - roof.air / roof.weights), minus(density, roof.air));
+
+/** Relative standard uncertainty of VCF by the distance from the base, with its sign. */
+function vcfScale(rule, celsius, base) {
+  const distance = Math.abs(celsius - base);
+  const last = rule.at_k.length - 2;
+  let piece = 0;
+  while (piece < last && distance >= rule.at_k[piece + 1]) piece += 1;
+  const [low, high] = [rule.at_k[piece], rule.at_k[piece + 1]];
+  const [below, above] = [rule.percent[piece], rule.percent[piece + 1]];
+  const percent = below + ((distance - low) * (above - below)) / (high - low);
+  return (Math.sign(celsius - base) * percent) / 100 / 1.96;
+}
+
+/** Dips and temperatures of one gauging, checked. */
+function gaugingOf(tank, given, place, isInsulated) {
+  const refuse = (key) => { throw new Refusal(key, place); };
+  const { dip, ullage, water, liquid, ambient } = given;
+  if ([dip, ullage, water, liquid, ambient].some(Number.isNaN)) refuse("no_number");
+  if (dip !== null && ullage !== null) refuse("dip_and_ullage");
+  if (dip === null && ullage === null) refuse("no_dip");
+  if (ullage !== null && tank.reference_height_m === null) refuse("no_reference");
+  const level = ullage === null ? dip : tank.reference_height_m - ullage;
+  const first = tank.heights[0];
+  if (!(level >= first && level <= tank.heights.at(-1))) refuse("outside_table");
+  if (tank.roof && level < tank.roof.critical_top_m) refuse("critical");
+  if (water !== null && water >= level) refuse("water_above");
+  if (tank.roof?.is_in_table && water > tank.roof.critical_bottom_m) refuse("water_at_roof");
+  if (liquid === null) refuse("liquid_blank");
+  if (!isInsulated && ambient === null) refuse("ambient_blank");
+  const hasWater = water !== null && water > 0 && water >= first;
+  return { level, taped: ullage === null ? level : -ullage, water: hasWater ? water : null, liquid, ambient };
+}
+
+/** Steps of one gauging; the names of its own inputs end in its place. */
+function followChain(tank, gauging, liquid, place) {
+  const { correction, base, waterShare, isInsulated, expansion, u } = liquid;
+  const level = {
+    value: gauging.level,
+    slopes: { [`dip ${place}`]: 1, tape: gauging.taped },
+  };
+  const found = tableVolume(tank, level);
+  const tov = plus(found.volume, { value: 0, slopes: { [`table ${place}`]: 1 } });
+  const fw = gauging.water === null ? lift(0)
+    : tableVolume(tank, input(gauging.water, `water ${place}`)).volume;
+  const celsius = input(gauging.liquid, `temperature ${place}`, "thermometer");
+  const shell = isInsulated ? celsius
+    : over(plus(times(7, celsius), input(gauging.ambient, "ambient")), 8);
+  const ctsh = shellFactor(tank, level, shell, expansion);
+  const [low, high] = correction.limits(base.value);
+  if (!(gauging.liquid >= low && gauging.liquid <= high)) throw new Refusal("liquid_range", place);
+  const scale = u.u_vcf === null ? vcfScale(tank.vcf_rule, gauging.liquid, correction.base_c)
+    : u.u_vcf / 100;
+  const vcf = times(correction.factor(base, celsius), { value: 1, slopes: { vcf: scale } });
+  const observed = times(base, vcf);
+  let fra = lift(0);
+  if (tank.roof) {
+    const reference = tank.roof.is_in_table
+      ? displacement(tank.roof, tank.roof.reference_density) : lift(0);
+    fra = minus(reference, displacement(tank.roof, observed));
+  }
+  const gov = plus(times(minus(tov, fw), ctsh), fra);
+  if (!(gov.value > 0)) throw new Refusal("negative", place);
+  const gsv = times(gov, vcf);
+  const csw = minus(1, waterShare);
+  const nsv = times(gsv, csw);
+  const mass = times(nsv, base);
+  const air = over(minus(1, over(tank.air, base)), 1 - tank.air / tank.weights);
+  return { tov, fw, shell, ctsh, vcf, rho_t: observed, fra, gov, gsv, csw, nsv, mass, air,
+    weight: times(mass, air), row: found.row };
+}
+
+const QUANTITIES = ["tov", "gov", "gsv", "nsv", "mass", "weight"];
+
+/** {base density, steps of each place, moved: {quantity: {value, U, k}}}; throws a Refusal.
+
+ * `table` has columnsAt(height), inverseDof(columns) and coverage(inverse dof) of deliveries.js.
+ */
+function quantityOf(tank, table, given) {
+  const correction = correctionOf(tank.constants, given);
+  if (!(given.density >= 300 && given.density <= 2000)) throw new Refusal("density_range");
+  if (!given.density_is) throw new Refusal("density_is_blank");
+  const isObserved = given.density_is === "observed";
+  if (isObserved && !(given.sample >= -60 && given.sample <= 200 && given.sample !== null)) {
+    throw new Refusal("sample_blank");
+  }
+  if (!isObserved && (given.sample !== null || given.hydrometer)) throw new Refusal("sample_unused");
+  if (given.sw !== null && !(given.sw >= 0 && given.sw <= 20)) throw new Refusal("sw_range");
+  for (const [name, u] of Object.entries(given.u)) {
+    if (!(u >= 0) || (u === null && name !== "u_vcf")) throw new Refusal("u_wrong");
+  }
+  let base = input(given.density, "density");
+  if (isObserved) {
+    let glass = given.hydrometer ? glassCorrection(given.sample, given.hydrometer) : 1;
+    if (correction.glass_scale) glass /= glassCorrection(given.sample, correction.glass_scale);
+    base = correction.baseDensity(times(base, glass), given.sample);
+  }
+  const [least, most] = correction.densities;
+  if (!(base.value >= least && base.value <= most)) throw new Refusal("base_density_range");
+  const [low, high] = correction.limits(base.value);
+  if (isObserved && !(given.sample >= low && given.sample <= high)) throw new Refusal("sample_range");
+  const liquid = {
+    correction, base, u: given.u, isInsulated: given.insulated,
+    waterShare: input((given.sw ?? 0) / 100, "sw"), expansion: input(tank.expansion_per_k, "expansion"),
+  };
+  const isBlank = (gauging) => Object.values(gauging).every((value) => value === null);
+  if (isBlank(given.closing)) throw new Refusal("closing_blank", "closing");
+  const places = isBlank(given.opening) ? ["closing"] : ["opening", "closing"];
+  const [steps, gaugings] = [{}, {}];
+  for (const place of places) {
+    gaugings[place] = gaugingOf(tank, given[place], place, given.insulated);
+    steps[place] = followChain(tank, gaugings[place], liquid, place);
+  }
+  return { base_density: base.value, steps, moved: differences(tank, table, given, gaugings, steps) };
+}
+
+/** {quantity: {value, U, k}} of closing - opening, or of the closing alone. */
+function differences(tank, table, given, gaugings, steps) {
+  const { u } = given;
+  const standard = {
+    tape: u.u_tape / 1e6, thermometer: u.u_thermometer, density: u.u_density, vcf: 1,
+    ambient: u.u_ambient, sw: given.sw === null ? 0 : u.u_sw / 100, expansion: u.u_expansion,
+  };
+  const factors = {};
+  let inverse = 0;
+  for (const [place, gauging] of Object.entries(gaugings)) {
+    standard[`dip ${place}`] = u.u_dip / 1000;
+    standard[`water ${place}`] = u.u_water / 1000;
+    standard[`temperature ${place}`] = u.u_temperature;
+    standard[`table ${place}`] = tank.interpolation_m3 / Math.sqrt(3);
+    const water = gauging.water === null ? null : table.columnsAt(gauging.water);
+    factors[place] = table.columnsAt(gauging.level).map((value, column) =>
+      (value - (water ? water[column] : 0)) / tank.unit_factor);
+    const { row } = steps[place];
+    for (const height of [tank.heights[row], tank.heights[row + 1]]) {
+      inverse = Math.max(inverse, table.inverseDof(table.columnsAt(height)));
+    }
+  }
+  const moved = {};
+  for (const name of QUANTITIES) {
+    const closing = steps.closing[name];
+    const total = steps.opening ? minus(closing, steps.opening[name]) : closing;
+    const byTable = factors.closing.reduce((variance, _, column) => variance
+      + Object.keys(factors).reduce((part, place) =>
+        part + (total.slopes[`table ${place}`] ?? 0) * factors[place][column], 0) ** 2, 0);
+    const variance = Object.entries(total.slopes).reduce((all, [input_, slope]) =>
+      all + (slope * (standard[input_] ?? 0)) ** 2, byTable);
+    const k = table.coverage(variance > 0 ? (byTable / variance) ** 2 * inverse : 0);
+    moved[name] = { value: total.value, U: k * Math.sqrt(variance), k };
+  }
+  return moved;
+}
+return { quantityOf, Refusal };
+})();
