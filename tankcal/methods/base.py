@@ -242,6 +242,30 @@ class Method:
             return getattr(job, self.attribute)
         return job.surveys.get(self.name)
 
+    # ---- known walls
+
+    def observe(self, job, wall, errors):
+        """Readings of a `Job` as they would be on a known wall, for plans and simulations.
+
+        Parameters
+        ----------
+        job : Job
+            Job with readings of this method at the planned places.
+        wall : planning.wall.tank_walls.RoundWall or DrawnWall
+        errors : planning.wall.nominal_readings.Errors
+            Errors of the readings; the methods draw them in their order.
+
+        Returns
+        -------
+        object
+            As `read`; without a wall to be read, the readings of the job.
+        """
+        return self.readings_of(job)
+
+    def levels_read(self, job):
+        """Set of (course, height above the table's zero, m) of the readings of a `Job`."""
+        return set()
+
     # ---- pipeline
 
     def finds(self, job):
@@ -462,6 +486,15 @@ def find_method(name):
 def method_of(survey):
     """Method that found a survey; None for another survey, or without a survey."""
     return find_method(getattr(survey, "surveyed_as", None))
+
+
+def with_readings(job, readings):
+    """`Job` with other readings of some methods: {method: its readings}."""
+    from dataclasses import replace  # not loaded by the command line
+
+    attributes = {method.attribute: new for method, new in readings.items() if method.attribute}
+    others = {method.name: new for method, new in readings.items() if not method.attribute}
+    return replace(job, surveys=job.surveys | others, **attributes)
 
 
 def given_methods(job):

@@ -61,6 +61,18 @@ class HitsMethod(Method):
 
         return make_hits(tables, registers)
 
+    # ---- known walls
+
+    def observe(self, job, wall, errors):
+        from tankcal.methods.hits.observed import observe_hits
+
+        return observe_hits(job, wall, errors)
+
+    def levels_read(self, job):
+        from tankcal.methods.hits.observed import levels_of_hits
+
+        return set(levels_of_hits(job))
+
     # ---- pipeline
 
     def find(self, job, progress, network):

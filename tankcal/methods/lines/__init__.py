@@ -65,6 +65,16 @@ class LinesMethod(Method):
 
         return make_lines(tables, registers)
 
+    # ---- known walls
+
+    def observe(self, job, wall, errors):
+        from tankcal.methods.lines.observed import observe_offsets
+
+        return observe_offsets(job, wall, errors)
+
+    def levels_read(self, job):
+        return {(offset.course, offset.level_m) for offset in job.lines.offsets}
+
     # ---- pipeline
 
     def finds(self, job):

@@ -88,6 +88,16 @@ class StrappingMethod(Method):
 
         return make_strapping(values, tables, registers)
 
+    # ---- known walls
+
+    def observe(self, job, wall, errors):
+        from tankcal.methods.strapping.observed import observe_straps
+
+        return observe_straps(job, wall, errors)
+
+    def levels_read(self, job):
+        return {(strap.course, strap.level_m) for strap in job.strapping.straps}
+
     # ---- pipeline
 
     def finds(self, job):

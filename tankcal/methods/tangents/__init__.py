@@ -59,6 +59,17 @@ class TangentsMethod(Method):
 
         return make_tangents(tables, registers)
 
+    # ---- known walls
+
+    def observe(self, job, wall, errors):
+        from tankcal.methods.tangents.observed import observe_tangents
+
+        return observe_tangents(job, wall, errors)
+
+    def levels_read(self, job):
+        tangents = job.tangents
+        return set(zip(tangents.course, tangents.level_m.tolist(), strict=True))
+
     # ---- pipeline
 
     def find(self, job, progress, network):

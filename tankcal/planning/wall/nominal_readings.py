@@ -27,25 +27,20 @@ import numpy as np
 from tankcal.geometry.field.blunders import restricted_precision
 from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.sites import free_design
+from tankcal.methods.base import given_methods, with_readings
 from tankcal.pipeline.liquid.adjustment import adjust_liquid
 from tankcal.pipeline.liquid.alone import geometry_beside
 from tankcal.pipeline.liquid.geometry import load_geometry
 from tankcal.pipeline.surveying import find_survey
 from tankcal.planning.measurements import draw_blunders
-from tankcal.planning.wall.design_tables import OFF_WALL_M
-from tankcal.planning.wall.tank_walls import RoundWall, plates_of
+from tankcal.planning.wall.tank_walls import RoundWall
 from tankcal.survey.observations import KINDS
 from tankcal.survey.readings import read_distance_m
-from tankcal.survey.sighting import bias_by_incidence, rays
-from tankcal.survey.strapping import reduce_straps
 from tankcal.tank.liquid import fill_of, reduce_steps
 from tankcal.tank.liquid.reduction import load_densities
-from tankcal.units import FULL_TURN
 
 UNKNOWN_OFFSET_M = 2e-3  # sd of the offset of an instrument without a prior
 UNKNOWN_COLLIMATION_RAD = np.radians(10 / 3600)  # sd for a plummet read in both faces
-CLOSE_M, ROUNDS = 1e-12, 20  # convergence limit and largest number of iterations
-MILLIMETRES = 3  # decimals to which heights of hits are rounded to form levels
 HELD = 1e-6  # prior sd of the logarithm of a given variance, which is not estimated
 
 
@@ -159,7 +154,7 @@ def _set_nominal_wall(job, amplitudes):
 
 
 def set_readings(job, wall, errors=EXACT):
-    """Return the job with the circumferences, offsets, hits and limbs of a wall of its tank.
+    """Return the job with the readings of a wall of its tank, by each of its methods.
 
     Parameters
     ----------
@@ -173,156 +168,14 @@ def set_readings(job, wall, errors=EXACT):
     -------
     Job
     """
-    return replace(
-        job,
-        strapping=job.strapping and _read_straps(job, wall, errors),
-        lines=job.lines and _read_offsets(job, wall, errors),
-        hits=job.hits and _read_hits(job, wall, errors),
-        tangents=job.tangents and _read_tangents(job, wall, errors),
+    return with_readings(
+        job, {method: method.observe(job, wall, errors) for method in given_methods(job)}
     )
 
 
 def levels_of_readings(job):
     """Return {(course, level above the table's zero, m)} of all readings of the wall."""
-    levels = set()
-    for readings in (job.strapping and job.strapping.straps, job.lines and job.lines.offsets):
-        levels |= {(reading.course, reading.level_m) for reading in readings or ()}
-    if job.tangents is not None:
-        levels |= set(zip(job.tangents.course, job.tangents.level_m.tolist(), strict=True))
-    return levels | (set() if job.hits is None else set(_levels_of_hits(job)))
-
-
-def _read_straps(job, wall, errors):
-    """Return tape readings whose reduction gives the perimeters of the wall, by iteration."""
-    strapping, diameter = job.strapping, job.tank.nominal_diameter_m
-    shell_c = job.survey.shell_temperature_c
-    girth = np.array([wall.girth_m(strap.course, strap.level_m) for strap in strapping.straps])
-    reduced = reduce_straps(strapping, shell_c, diameter)
-    # Errors are added to the reduced perimeters, in which the standard deviations are defined.
-    girth += errors.draw([strap.sd_m for strap in reduced])
-    girth += [
-        sum(errors.draw_cause(e.kind, e.name) * e.by_m for e in strap.effects) for strap in reduced
-    ]
-    # The reduction (temperature, tension, friction) depends on the reading: invert by iteration.
-    for _ in range(ROUNDS):
-        reduced = reduce_straps(strapping, shell_c, diameter)
-        short = girth - [strap.circumference_m for strap in reduced]
-        straps = zip(strapping.straps, short, strict=True)
-        strapping = replace(
-            strapping,
-            straps=tuple(
-                replace(strap, reading_m=strap.reading_m + float(by)) for strap, by in straps
-            ),
-        )
-        if np.abs(short).max() < CLOSE_M:
-            break
-    return strapping
-
-
-def _read_offsets(job, wall, errors):
-    """Return offsets from vertical lines.
-
-    A larger radius lowers them outside and raises them inside.
-    """
-    lines, first = job.lines, job.courses[0].name
-    constant = wall.nominal_m + plates_of(job)[first]
-    offsets = []
-    for reading, off in zip(
-        lines.offsets, errors.draw([offset.sd_m for offset in lines.offsets]), strict=True
-    ):
-        line, plummet = lines.of(reading)
-        place = reading.course, reading.level_m, line.azimuth_rad
-        radius = float(wall.radius_m(*place, inside=line.inside))
-        away = radius - wall.nominal_m if line.inside else constant - radius
-        leans = lines.by_collimation_m(reading) * errors.collimation_rad(plummet)
-        away += OFF_WALL_M + (leans if line.inside else -leans)
-        away /= (1 + plummet.correction) * (1 + errors.scale(plummet))
-        offsets.append(replace(reading, offset_m=away + float(off)))
-    return replace(lines, offsets=tuple(offsets))
-
-
-def _stations_of_hits(hits):
-    """Instrument positions (n, 3) of the hits."""
-    places = {
-        name: hits.stations.get(setup.station, np.zeros(3)) + [0.0, 0.0, setup.height_m]
-        for name, setup in hits.setups.items()
-    }
-    return np.array([places[name] for name in hits.setup])
-
-
-def _levels_of_hits(job):
-    """Return (course, level above the table's zero, m) of each hit as aimed."""
-    hits, datum = job.hits, job.datum
-    rise = hits.distance_m * np.cos(hits.zenith_rad)
-    z = _stations_of_hits(hits)[:, 2] + rise - datum.bottom_z_m - datum.plate_level_m
-    return list(zip(hits.course, np.round(z, MILLIMETRES).tolist(), strict=True))
-
-
-def _read_hits(job, wall, errors):
-    """Return hits along their own sights, up to the inside or outside of the wall."""
-    hits, levels = job.hits, _levels_of_hits(job)
-    station, ray = _stations_of_hits(hits)[:, :2], rays(hits.direction_rad, hits.zenith_rad)[0]
-    inside, ray = np.hypot(*station.T) < wall.nominal_m, ray[:, :2]
-    distance, cosine = np.empty(len(hits)), np.empty(len(hits))
-    kinds = list(zip(levels, inside.tolist(), strict=True))
-    for level, within in dict.fromkeys(kinds):
-        of_kind = np.array([kind == (level, within) for kind in kinds])
-        distance[of_kind], cosine[of_kind] = _intersect(
-            wall, station[of_kind], ray[of_kind], level, inside=within
-        )
-    # Distances with their common errors, then the inverse of the corrections by the certificate.
-    known = [hits.instruments[name] for name in hits.instrument]
-    bias = [errors.draw_cause("incidence", tool.name) * tool.u_incidence_m for tool in known]
-    distance *= 1 + np.array([errors.scale(tool) for tool in known])
-    distance += np.array([errors.offset_m(tool) for tool in known])
-    distance += np.array(bias) * bias_by_incidence(cosine)
-    distance /= 1 + np.array([tool.correction for tool in known])
-    distance -= np.array([tool.correction_m for tool in known])
-    return replace(
-        hits,
-        distance_m=distance + errors.draw(hits.sd_m),
-        direction_rad=hits.direction_rad + errors.draw(hits.sd_rad),
-        zenith_rad=hits.zenith_rad + errors.draw(hits.sd_rad),
-    )
-
-
-def _intersect(wall, station_m, ray, level, *, inside):
-    """Distance along horizontal rays (n, 2) to a level of the wall, and cosine of incidence."""
-    # First the circle of nominal radius: |station + far ray|^2 = R^2, a quadratic in far.
-    square, along = np.sum(ray**2, axis=1), np.sum(station_m * ray, axis=1)
-    beyond = along**2 - square * (np.sum(station_m**2, axis=1) - wall.nominal_m**2)
-    root = np.sqrt(np.maximum(beyond, 0.0))
-    far = (-along + (root if inside else -root)) / square
-    # Then Newton: the distance from the axis changes by the slope (cosine of incidence) per metre.
-    for _ in range(ROUNDS):
-        x, y = (station_m + far[:, None] * ray).T
-        away = np.hypot(x, y)
-        slope = (x * ray[:, 0] + y * ray[:, 1]) / away
-        short = wall.radius_m(*level, np.arctan2(x, y), inside=inside) - away
-        far = far + short / slope
-        if np.abs(short).max() < CLOSE_M:
-            break
-    return far, np.abs(slope)
-
-
-def _read_tangents(job, wall, errors):
-    """Return sights past the outside of each course at the aimed height."""
-    tangents, datum = job.tangents, job.datum
-    zero = datum.bottom_z_m + datum.plate_level_m
-    stations, sights = place_stations(job), []
-    for name, course, level, is_right in zip(
-        *(tangents.setup, tangents.course, tangents.level_m.tolist(), tangents.is_right),
-        strict=True,
-    ):
-        x, y, z = stations[name]
-        azimuth, length = wall.limb((x, y), course, level, is_right=bool(is_right))
-        sights.append((azimuth % FULL_TURN, np.arctan2(length, zero + level - z)))
-    direction, zenith = np.array(sights).T
-    return replace(
-        tangents,
-        direction_rad=direction + errors.draw(tangents.sd_rad),
-        zenith_rad=zenith + errors.draw(tangents.sd_rad),
-    )
+    return set().union(*(method.levels_read(job) for method in given_methods(job)))
 
 
 def _ranger(job):
