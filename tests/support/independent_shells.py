@@ -26,6 +26,8 @@ outside or centred. Sizes were chosen before any table of them was computed; sin
 bounded: plates of 22 mm were drawn in by 17 mm.
 """
 
+from functools import partial
+
 import numpy as np
 from generated_walls import FULL_TURN, GeneratedWall, _arc, _cap
 from numpy.polynomial.legendre import legval
@@ -72,7 +74,12 @@ def add_measured_bulge(rng, shell):
     orders = [0, 0, MEASURED_ORDERS_M[0], 0, MEASURED_ORDERS_M[1]]
     for course in range(shell.courses):
         own = size * (1 + 0.1 * rng.normal())
-        shell.add(course, np.ones_like, lambda s, own=own: own * legval(s, orders))
+        shell.add(course, np.ones_like, partial(_bulge_of, own, orders))
+
+
+def _bulge_of(size, orders, zeta):
+    """Bulge at zeta; a sight may pass above the shell, where it is that of the top."""
+    return size * legval(np.clip(zeta, -1, 1), orders)
 
 
 def plates_of(shell):
