@@ -18,7 +18,7 @@ from tankcal.job.tables import MAX_COLUMNS, read_bytes, shown, too_many_columns
 from tankcal.linter.headings import heading_of, is_unit
 from tankcal.linter.pdf_text import read_pages
 from tankcal.messages import message
-from tankcal.record import FORMAT, version_of
+from tankcal.record import FORMAT, altered_since, version_of
 from tankcal.text.delimited import find_separator, split_cells
 
 MOST_LINES = 100_000
@@ -68,6 +68,9 @@ def read_grids(path, log):
     if text is None:
         return ()
     if path.suffix.lower() == ".json" or text.lstrip()[:1] == "{":
+        altered = altered_since(path)
+        if altered is not None:
+            log.problem(path.name, altered)
         return _record(path.name, text, log)
     return _csv(path.name, text, log)
 

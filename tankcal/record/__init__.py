@@ -155,20 +155,38 @@ def content_error(file, error):
     return InputError(Problem(file, expected))
 
 
-def _refuse_altered(path):
-    """Raise InputError for a file with another SHA-256 than in SHA256SUMS of its folder."""
+def altered_since(path):
+    """Return the Message that a record was altered after it was written, or None.
+
+    Parameters
+    ----------
+    path : Path
+        The record; SHA256SUMS of its folder states its SHA-256.
+
+    Returns
+    -------
+    Message or None
+        None also without SHA256SUMS.
+    """
     try:
         listed = manifest.read_manifest(path.parent)
     except InputError:  # SHA256SUMS of another program
-        return
+        return None
     digest = listed.digests.get(path.name) if listed else None
-    if digest not in (None, manifest.digest_of(path)):
-        expected = message(
-            "record_altered",
-            "was altered after tankcal wrote it: its SHA-256 is not the one in {file}; expected "
-            "the file as it was: run the job again",
-            file=manifest.FILE,
-        )
+    if digest in (None, manifest.digest_of(path)):
+        return None
+    return message(
+        "record_altered",
+        "was altered after tankcal wrote it: its SHA-256 is not the one in {file}; expected "
+        "the file as it was: run the job again",
+        file=manifest.FILE,
+    )
+
+
+def _refuse_altered(path):
+    """Raise InputError for a file with another SHA-256 than in SHA256SUMS of its folder."""
+    expected = altered_since(path)
+    if expected is not None:
         raise InputError(Problem(path.name, expected))
 
 

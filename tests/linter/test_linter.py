@@ -1,6 +1,7 @@
 """The linter: no false alarm on exact tables of many shapes, and what it finds in spoilt ones."""
 
 import contextlib
+import hashlib
 import json
 from collections import defaultdict
 from itertools import pairwise
@@ -911,6 +912,20 @@ def test_records(tmp_path):
     (tmp_path / "record.json").write_text(json.dumps(record))
     with pytest.raises(InputError, match="951 heights and 950 volumes"):
         lint(tmp_path / "record.json")
+
+
+def test_an_altered_record_is_refused(tmp_path):
+    """Volumes scaled by 1 % are smooth; only the SHA-256 shows the change."""
+    table = {"height_m": (CM / 100).tolist(), "volume_m3": (LITRES / 1000).tolist()}
+    path = tmp_path / "record.json"
+    path.write_text(json.dumps({"format": "tankcal-record/1", "capacity": table}))
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    (tmp_path / "SHA256SUMS").write_text(f"# made by tankcal 0.1.0\n{digest}  record.json\n")
+    assert lint(path).findings == ()
+    table["volume_m3"] = (LITRES * 1.01 / 1000).tolist()
+    path.write_text(json.dumps({"format": "tankcal-record/1", "capacity": table}))
+    with pytest.raises(InputError, match="was altered after tankcal wrote it"):
+        lint(path)
 
 
 @pytest.mark.slow
