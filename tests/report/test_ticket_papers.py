@@ -297,3 +297,15 @@ def test_hostile_texts_stay_texts(tmp_path):
              for row in sheet for cell in row]  # fmt: skip
     assert not [cell for cell in cells if cell.data_type == "f"]
     assert "<script>x" not in (tmp_path / "out" / "ticket.html").read_text(encoding="utf-8")
+
+
+def test_a_stock_has_no_column_of_an_opening(tmp_path):
+    stock = {section: values for section, values in LONG.items()
+             if section not in ("opening", "compared")}  # fmt: skip
+    write_ticket(document_file(read_tickets(_cylinder(), stock)), tmp_path / "out", "en")
+    text = pypdf.PdfReader(tmp_path / "out" / "ticket.pdf").pages[0].extract_text()
+    words = load_words("en")["ticket"]
+    assert words["table_headings"]["opening"] not in text.replace(stock["ticket"]["note"], "")
+    assert words["table_headings"]["closing"] in text
+    saved = json.loads((tmp_path / "out" / "ticket.json").read_text(encoding="utf-8"))
+    assert {row["state"] for row in saved["quantities"]} == {"closing"}

@@ -33,6 +33,8 @@ def pages(paper, folder=None, whole=False):
     -------
     list of Block
     """
+    is_stock = len(paper.record["gaugings"]) == 1
+    steps = paper.show(STEPS.only("step", "formula", "source", "closing") if is_stock else STEPS)
     return [
         *paper.head(folder),
         blocks.side_by_side(_show_facts(paper, _head(paper))),
@@ -40,7 +42,7 @@ def pages(paper, folder=None, whole=False):
         paper.show(RESULTS, result_rows(paper)),
         paper.facts(_gaugings(paper)),
         blocks.side_by_side(paper.facts(_properties(paper))),
-        paper.show(STEPS) if whole else blocks.whole(paper.show(STEPS)),
+        steps if whole else blocks.whole(steps),
         paper.show(
             BUDGET, budget_rows(paper), across=None if whole else ACROSS,
             state=paper.words["states"][paper.state],
