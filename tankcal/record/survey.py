@@ -311,11 +311,10 @@ def courses_of(result):
     job, rows = result.job, []
     if job.tank.kind != "vertical":
         return []
-    measured = _strapped_course if result.strapped is not None else _drawn_course
     if result.wall is not None:
         measured = partial(_surveyed_course, _rejected_z_m(result))
-    elif result.radii is not None:
-        measured = _former_course
+    else:
+        measured = partial(_course_without_points, next(iter(result.surveys.values())))
     surveyed = shell_by_survey(result)
     for index, (course, shape) in enumerate(
         zip(job.courses, result.body.shell.volume.courses, strict=True)
@@ -366,32 +365,19 @@ def _surveyed_course(rejected_z_m, result, index, shape):
     }
 
 
-def _strapped_course(result, index, shape):
-    """Return the keys of a course that follow from straps: circumferences are its sections."""
-    wall, name = result.strapped, result.job.courses[index].name
-    straps = wall.straps
-    names = [straps.reduced[i].strap.name for i in straps.adjusted
-             if straps.reduced[i].strap.course == name]  # fmt: skip
+def _course_without_points(survey, result, index, shape):
+    """Return the keys of a course of a wall without points: circumferences are its sections."""
+    straps, names = survey.straps, []
+    if straps is not None:
+        adjusted = [straps.reduced[i].strap for i in straps.adjusted]
+        course = result.job.courses[index].name
+        names = [strap.name for strap in adjusted if strap.course == course]
     return {
         "sections": list(dict.fromkeys(names)),
         "points": len(names),
         "rejected": 0,
-        "radius_m": wall.radius_m[index],
+        "radius_m": survey.radius_m[index],
     }
-
-
-def _drawn_course(result, index, shape):
-    """Return the keys of a course that only liquid measured."""
-    return _unmeasured_course(result.nominal.radius_m[index])
-
-
-def _former_course(result, index, shape):
-    """Return the keys of a course whose radius was declared."""
-    return _unmeasured_course(result.radii.radius_m[index])
-
-
-def _unmeasured_course(radius_m):
-    return {"sections": [], "points": 0, "rejected": 0, "radius_m": radius_m}
 
 
 def shell_by_survey(result):
