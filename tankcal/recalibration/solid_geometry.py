@@ -22,6 +22,7 @@ EXCLUDING_CHI2 = 9.0  # excess of chi-squared that excludes a form: three sds of
 TILTS = (-0.005, 0.005)  # start values
 NEAR = 4.0  # excess of chi-squared at the limits of a tilt: two standard deviations
 LARGEST_RATIO = 1.1  # largest ratio of diameters that fit equally well
+LARGEST_U_OF_DIAMETER = 0.1  # relative; a less certain diameter is not determined
 _HALVINGS = 6
 _SURE = 20  # tilt over its standard deviation, above which the model is linear in the tilt
 FEWEST_ROWS = 8
@@ -411,6 +412,16 @@ def fit_lying(former: FormerTable, dip_from_a_m: float | None = None) -> LyingGe
     whole = _repeat_fit(all_rows, best, dip_from_a_m)
     if whole is None:
         raise SolutionError(no_solid_message())
+    if not whole.u[0] <= LARGEST_U_OF_DIAMETER * whole.values[0]:  # also inf and nan
+        raise SolutionError(
+            message(
+                "read_undetermined",
+                "{name}: the rows up to {last:.4g} m do not reach high enough to separate "
+                "diameter from length and ends",
+                name=str(former.name),
+                last=float(rows.height[-1]),
+            )
+        )
     return LyingGeometry(whole, worse, *_tilt(rows, all_rows, best, whole, dip_from_a_m))
 
 

@@ -186,3 +186,22 @@ def test_the_lowest_rows_of_a_lying_tank():
     assert abs(diameter - 2.5) < 3 * u
     with pytest.raises(SolutionError, match="do not reach high enough"):
         fit_lying(lying_rows(11))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("radius", "length", "depth", "step", "rows", "digits"),
+    [(1.3, 8, 1.3, 0.01, 32, 3), (1.0, 5, 0.5, 0.001, 241, 4)],
+)
+def test_a_diameter_that_low_rows_do_not_determine(radius, length, depth, step, rows, digits):
+    """Closed form with ellipsoidal ends, the lowest 12 %: 15.0 m for 2.6 and 7.4 m for 2.0."""
+    dips = np.arange(rows) * step
+    below = radius - dips
+    area = radius**2 * np.arccos(below / radius) - below * np.sqrt(radius**2 - below**2)
+    ends = np.pi * depth * dips**2 * (1 - dips / (3 * radius))
+    volumes = np.round(length * area + ends, digits)
+    table = replace(
+        table_of(tank()), height_m=dips, volume_m3=volumes, volume_quantum_m3=10.0**-digits
+    )
+    with pytest.raises(SolutionError, match="do not reach high enough"):
+        fit_lying(table)
