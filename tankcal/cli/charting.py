@@ -34,6 +34,11 @@ def add(commands):
         help="centimetres between two rows (default: 1)",
     )
     parser.add_argument(
+        "--ullage",
+        action="store_true",
+        help="ullages from the reference height in place of dips",
+    )
+    parser.add_argument(
         "--out", metavar="FILE", help="output file (default: TANK-chart.pdf in this folder)"
     )
     add_language(parser)
@@ -57,7 +62,10 @@ def _chart(options):
     if out.suffix.lower() != ".pdf" or out.is_dir():
         expected = message("chart_out", "expected the name of a .pdf file")
         raise InputError(Problem("--out", expected))
-    count = write_chart(source, out, options.language, options.product, options.step_cm or 1)
+    count = write_chart(
+        source, out, options.language, options.product, options.step_cm or 1,
+        by_ullage=options.ullage,
+    )  # fmt: skip
     if options.machine:
         print_json(exit_status=0, rows=count, files=[str(out)])
         return 0

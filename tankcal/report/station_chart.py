@@ -28,7 +28,7 @@ _ACROSS = range(1, 10)  # numbers of columns side by side
 _MOST_PT = 20.0  # largest type
 
 
-def write_chart(source, out, language=None, product=None, step_cm=1):
+def write_chart(source, out, language=None, product=None, step_cm=1, *, by_ullage=False):
     """Write the field chart of a record as a PDF.
 
     Parameters
@@ -43,6 +43,8 @@ def write_chart(source, out, language=None, product=None, step_cm=1):
         Name of the product; None: that of the job.
     step_cm : int, optional
         Centimetres between two rows.
+    by_ullage : bool, optional
+        True: the rows are ullages from the reference height in place of dips.
 
     Returns
     -------
@@ -52,7 +54,8 @@ def write_chart(source, out, language=None, product=None, step_cm=1):
     Raises
     ------
     InputError
-        For a record without a table, and for a table with too many rows for a page.
+        For a record without a table or, for ullages, without a reference height, and for a table
+        with too many rows for a page.
     """
     from tankcal.report.pdf import pdf
 
@@ -60,7 +63,13 @@ def write_chart(source, out, language=None, product=None, step_cm=1):
     if not record["capacity"]:
         text = message("chart_no_table", "the record of a survey without a tank; expected a table")
         raise InputError(Problem(source.name, text))
-    rows = chart_rows(record, step_cm)
+    if by_ullage and record["job"]["datum"]["reference_height_m"] is None:
+        text = message(
+            "chart_no_reference",
+            "the record has no reference height; expected a job with datum.reference_height_m",
+        )
+        raise InputError(Problem("--ullage", text))
+    rows = chart_rows(record, step_cm, by_ullage=by_ullage)
     if len(rows) > MOST_ROWS:
         text = message(
             "chart_many_rows",
@@ -70,7 +79,7 @@ def write_chart(source, out, language=None, product=None, step_cm=1):
         raise InputError(Problem("--step-cm", text))
     digest = hashlib.sha256(source.read_bytes()).hexdigest()
     language = language or language_of(record)
-    shown = pages(record, rows, language, product, digest)
+    shown = pages(record, rows, language, product, digest, by_ullage=by_ullage)
     content = pdf([block.data for block in shown], source.parent)
     temporary = Path(out).with_name(f".{Path(out).name}.tmp")
     try:
@@ -81,21 +90,31 @@ def write_chart(source, out, language=None, product=None, step_cm=1):
     return len(rows)
 
 
-def chart_rows(record, step_cm=1):
-    """Rows (cm, litres or None) of each step within the table; None in a critical zone."""
+def chart_rows(record, step_cm=1, *, by_ullage=False):
+    """Rows (cm, litres or None) of each step within the table; None in a critical zone.
+
+    With `by_ullage` the centimetres are ullages: the reference height less the dip.
+    """
     capacity, critical = record["capacity"], critical_zone(record)
     heights, volumes = capacity["height_m"], capacity["volume_m3"]
     # The tolerance keeps the errors of binary fractions from losing a row at a whole centimetre.
-    first, last = math.ceil(100 * heights[0] - 1e-7), math.floor(100 * heights[-1] + 1e-7)
-    dips = [cm for cm in range(first, last + 1) if cm % step_cm == 0]
-    litres = 1000 * np.interp(np.array(dips) / 100, heights, volumes)
+    reference = record["job"]["datum"]["reference_height_m"]
+    low, high = heights[0], heights[-1]
+    if by_ullage:
+        low, high = reference - high, reference - low
+    first, last = math.ceil(100 * low - 1e-7), math.floor(100 * high + 1e-7)
+    shown = [cm for cm in range(first, last + 1) if cm % step_cm == 0]
+    dips = np.array(shown) / 100
+    if by_ullage:
+        dips = reference - dips
+    litres = 1000 * np.interp(dips, heights, volumes)
     return [
-        (cm, None if critical and critical[0] < cm / 100 < critical[1] else volume)
-        for cm, volume in zip(dips, litres.tolist(), strict=True)
+        (cm, None if critical and critical[0] < dip < critical[1] else volume)
+        for cm, dip, volume in zip(shown, dips.tolist(), litres.tolist(), strict=True)
     ]
 
 
-def pages(record, rows, language, product=None, digest=""):
+def pages(record, rows, language, product=None, digest="", *, by_ullage=False):
     """Return the blocks of the page.
 
     Parameters
@@ -110,6 +129,8 @@ def pages(record, rows, language, product=None, digest=""):
         Name of the product; None: that of the job.
     digest : str, optional
         SHA-256 of the record.
+    by_ullage : bool, optional
+        Whether the rows are ullages.
 
     Returns
     -------
@@ -118,7 +139,8 @@ def pages(record, rows, language, product=None, digest=""):
     words = load_words(language)
     paper, job = PlainPaper(words), record["job"]
     marks, certificate = paper.marks, job["certificate"]
-    tank, title = job["tank"], paper.word("chart.title")
+    tank = job["tank"]
+    title = paper.word("chart.title_of_ullage" if by_ullage else "chart.title")
     product = product or tank["details"].get("product") or ""
     survey = (job["survey"] or {}).get("date")
     day = certificate.get("date_of_issue") or survey
@@ -130,6 +152,9 @@ def pages(record, rows, language, product=None, digest=""):
     ]
     temperature = shortest(job["table"]["reference_temperature_c"], marks)
     texts = [paper.word("chart.use", temperature=temperature)]
+    if by_ullage:
+        reference = fixed(job["datum"]["reference_height_m"], 3, marks)
+        texts = [paper.word("chart.use_ullage", temperature=temperature, reference=reference)]
     if any(litres is None for _, litres in rows):
         texts.append(paper.word("chart.critical", sign=NOTHING))
     cells = [

@@ -1,6 +1,7 @@
 """The field chart of `tankcal chart`: its numbers, and a single page of readable type."""
 
 import io
+import json
 import re
 
 import numpy as np
@@ -83,3 +84,29 @@ def test_too_many_rows_and_a_wrong_ending_are_refused(tank, tmp_path, capsys):
     assert main([*chart, str(tmp_path / "chart.csv")]) == 2
     assert ".pdf" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_ullages_are_the_reference_height_less_the_dip(tmp_path, capsys):
+    record = afloat(tmp_path)[1]
+    capacity, reference = record["capacity"], record["job"]["datum"]["reference_height_m"]
+    rows = dict(chart_rows(record, by_ullage=True))
+    assert list(rows) == list(range(70, 1021))  # 10.2 m less 9.5 m, to 10.2 m
+    assert rows[round(100 * (reference - capacity["height_m"][20]))] == pytest.approx(
+        1000 * capacity["volume_m3"][20], rel=1e-9
+    )
+    out = tmp_path / "ullage.pdf"
+    assert main(["chart", str(tmp_path / "record.json"), "--ullage", "--step-cm", "5", "--out",
+                 str(out), "--language", "en"]) == 0  # fmt: skip
+    text = pypdf.PdfReader(out).pages[0].extract_text()
+    assert "Ullage chart" in text
+    assert "10.200 m" in text
+
+
+def test_ullages_need_a_reference_height(tank, tmp_path, capsys):
+    record = json.loads(tank[1].read_text(encoding="utf-8"))
+    record["job"]["datum"]["reference_height_m"] = None
+    source = tmp_path / "record.json"
+    source.write_text(json.dumps(record), encoding="utf-8")
+    assert main(["chart", str(source), "--ullage", "--step-cm", "5", "--language", "en", "--out",
+                 str(tmp_path / "chart.pdf")]) == 2  # fmt: skip
+    assert "reference height" in capsys.readouterr().err
