@@ -145,7 +145,7 @@ def pages(record, rows, language, product=None, digest="", *, by_ullage=False):
     survey = (job["survey"] or {}).get("date")
     day = certificate.get("date_of_issue") or survey
     facts = [
-        (paper.word("chart.product"), product),
+        (paper.word("chart.product"), product or NOTHING),
         (paper.word("chart.number"), certificate.get("number") or NOTHING),
         (paper.word("chart.date"), NOTHING if day is None else str(day)[:10]),
         (paper.word("chart.uncertainty"), _uncertainty(paper, record)),
