@@ -24,6 +24,7 @@ _BUILT_IN = (  # in the order of `tankcal --help`
     "tankcal.products.shipped:Exports",
     "tankcal.products.shipped:Inspection",
     "tankcal.products.quantity:Quantity",
+    "tankcal.products.gauge:Gauge",
     "tankcal.products.shipped:Cameras",
     "tankcal.products.shipped:Intercomparison",
     "tankcal.products.shipped:Help",

@@ -39,6 +39,8 @@ class SavedFormat:
         Values of the key "kind"; () for a format without this key.
     complete : callable
         complete(data, version) adds to data of a version the keys that its drafts lacked.
+    schemas : Path
+        Folder of the JSON schemas of written data.
     """
 
     name: str
@@ -47,6 +49,7 @@ class SavedFormat:
     steps: dict = field(default_factory=dict)
     kinds: tuple = ()
     complete: Callable = lambda saved, version: saved
+    schemas: Path = SCHEMAS
 
     @property
     def format(self):
@@ -56,7 +59,7 @@ class SavedFormat:
     def schema_file(self, kind=None):
         """Return the path of the JSON schema of written data, of a kind if the format has any."""
         name = f"{self.name}-{self.version}"
-        return SCHEMAS / (f"{name}-{kind}.json" if self.kinds else f"{name}.json")
+        return self.schemas / (f"{name}-{kind}.json" if self.kinds else f"{name}.json")
 
     def schema(self, kind=None):
         """Return the JSON schema of written data, of a kind if the format has any."""

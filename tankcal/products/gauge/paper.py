@@ -1,0 +1,324 @@
+"""Document of a commissioning: gauge.json, CSV files, workbook and certificate."""
+
+from functools import partial
+from typing import ClassVar
+
+from tankcal.messages import message
+from tankcal.products.gauge.saved import GAUGE
+from tankcal.products.gauge.tables import BUDGET, CORRECTIONS, FILES, LEVELS, ZEROS
+from tankcal.report import blocks
+from tankcal.report.plain import words_with_part
+from tankcal.report.saved_document import SavedDocument
+from tankcal.report.saved_paper import SavedPaper, bearable
+from tankcal.text.digits import format_with_u, shortest
+from tankcal.text.languages import DEFAULT
+from tankcal.text.words import load_words
+
+FILE, WORKBOOK = "gauge.json", "gauge.xlsx"
+DIGEST = 12  # printed digits of a SHA-256
+_SPACE = "\N{NO-BREAK SPACE}"
+
+
+class GaugePaper(SavedPaper):
+    """Formatter of a `saved.GaugeFile` in a language.
+
+    Parameters
+    ----------
+    gauge : dict
+        Plain data; checked against its schema.
+    language : str, optional
+        One of languages.LANGUAGES; None: English.
+    letterhead : letterhead.Letterhead, optional
+        Letterhead of the laboratory.
+    """
+
+    kind, file = "gauge", FILE
+    attached: ClassVar[dict] = {
+        FILE: "gauge",
+        WORKBOOK: "gauge_workbook",
+        "corrections.csv": "gauge_corrections",
+    }
+
+    def __init__(self, gauge, language=None, letterhead=None):
+        super().__init__(words_with_part(load_words(language or DEFAULT), "gauge"))
+        self.saved = self.record = GAUGE.migrated(gauge, GAUGE.file)
+        self.letterhead = letterhead.data() if letterhead else None
+
+    def subject(self):
+        """Name of the tank."""
+        return bearable(f"{self.word('page.tank')} {self.record['tank']}")
+
+    def date(self):
+        """Day of the comparison."""
+        return self.record["certificate"]["date"]
+
+    def head(self, folder=None):
+        """Document block and head of the first page, with the number of the certificate."""
+        document, _ = super().head(folder)
+        masthead = blocks.masthead(
+            self.word("titles.gauge"),
+            self.subject(),
+            number_label=self.word("page.number"),
+            number=bearable(self.record["certificate"]["number"] or ""),
+        )
+        return [document, masthead]
+
+    def text_with_u(self, value, U, unit="mm"):
+        """A value with its U, such as "2.2 mm ± 1.9 mm"; None without a value."""
+        if value is None:
+            return None
+        written = format_with_u(value, U, self.marks)
+        return f"{written.value}{_SPACE}{unit} ± {written.uncertainty}{_SPACE}{unit}"
+
+    def reference_height(self):
+        """Reference height of the day of the comparison, with its U; None if not measured."""
+        height = self.number(self.record["reference_height_m"], "m", 4)
+        if height is None:
+            return None
+        U = self.number(self.record["U_reference_mm"], "image mm", u=self.record["U_reference_mm"])
+        return f"{height} ± {U}"
+
+    def decision(self):
+        """Sentence of the decision; None without a limit."""
+        decision = self.record["decision"]
+        if decision is None:
+            return None
+        limits = [
+            f"{shortest(value, self.marks)}{_SPACE}{unit}"
+            for value, unit in (
+                (decision["absolute_mm"], "mm"),
+                (decision["relative_percent"], "%"),
+            )
+            if value is not None
+        ]
+        name = "limit_both" if len(limits) == 2 else "limit_one"
+        return self.word(
+            "texts.decision",
+            verdict=self.words["verdicts"][decision["verdict"]],
+            limit=self.word(f"texts.{name}", first=limits[0], second=limits[-1]),
+            source=bearable(decision["source"]),
+            rule=self.word(f"rules.{decision['rule']}"),
+        )
+
+
+def pages(paper, folder=None, whole=False):
+    """Blocks of the certificate of a `GaugePaper`."""
+    gauge = paper.record
+    return [
+        *paper.head(folder),
+        paper.facts(_facts(paper)),
+        _result(paper),
+        *([] if gauge["decision"] is None else [blocks.paragraph(paper.decision())]),
+        paper.show(_drop_blanks(LEVELS, gauge["levels"])),
+        paper.facts(_line(paper)),
+        blocks.paragraph(_slope_text(paper)),
+        blocks.whole(paper.show(BUDGET)),
+        paper.show(_drop_blanks(CORRECTIONS, gauge["corrections"]), across=2),
+        paper.paragraph("corrections"),
+        *_zeros(paper),
+        *_head_of_liquid(paper),
+        *_remarks(paper),
+        _signature(paper),
+        blocks.end_mark(paper.word("texts.end")),
+    ]
+
+
+def _drop_blanks(table, rows):
+    """Table without the columns that no row has."""
+    known = {key for row in rows for key, value in row.items() if value not in (None, False)}
+    return table.only(*known)
+
+
+def _facts(paper):
+    """Facts of the certificate, the gauge, the tape and the liquid."""
+    gauge = paper.record
+    certificate, instrument, tape = gauge["certificate"], gauge["gauge"], gauge["tape"]
+    named = [instrument[key] for key in ("maker", "model") if instrument[key]]
+    return [
+        ("customer", certificate["customer"] and bearable(certificate["customer"])),
+        ("place", certificate["place"] and bearable(certificate["place"])),
+        ("date", paper.day(certificate["date"])),
+        ("gauge", bearable(" ".join(named))),
+        ("serial", instrument["serial"] and bearable(instrument["serial"])),
+        ("principle", instrument["principle"] and bearable(instrument["principle"])),
+        ("gauge_certificate", instrument["certificate"] and bearable(instrument["certificate"])),
+        ("resolution", paper.plain(instrument["resolution_mm"], "mm")),
+        ("supported_by", paper.word(f"supports.{instrument['supported_by']}")),
+        ("range", paper.word("texts.range", low=paper.height(instrument["lowest_m"]),
+                             high=paper.height(instrument["highest_m"]))),
+        ("tape", bearable(", ".join(filter(None, (tape["serial"], tape["certificate"]))))),
+        ("liquid", gauge["liquid"] and bearable(gauge["liquid"])),
+        ("reference_height", paper.reference_height()),
+        ("table_reference_height", paper.number(gauge["table_reference_height_m"], "m", 4)),
+        ("note", certificate["note"] and bearable(certificate["note"])),
+    ]  # fmt: skip
+
+
+def _result(paper):
+    """Main result: the offset, with the slope below."""
+    line = paper.record["line"]
+    return blocks.result(
+        paper.word("labels.offset_at", level=paper.height(round(line["mean_level_m"], 3))),
+        paper.text_with_u(line["offset_mm"], line["U_offset_mm"]),
+        paper.word(
+            "texts.slope_note" if line["is_slope_estimated"] else "texts.slope_declared",
+            slope=paper.text_with_u(line["slope_mm_per_m"], line["U_slope_mm_per_m"], "mm/m"),
+            probability=paper.percent(paper.record["coverage_probability"]),
+        ),
+    )
+
+
+def _line(paper):
+    """Facts of the line: offset, slope, its parts, and the scatter."""
+    line = paper.record["line"]
+    zero = paper.record["zeros"][2]
+    number = partial(paper.number, decimals=2)
+
+    def with_u(key):
+        return paper.text_with_u(line[key], line[f"U_{key}"], "mm/m")
+
+    return [
+        ("slope", with_u("slope_mm_per_m")),
+        ("slope_of_pipe", with_u("pipe_mm_per_m")),
+        ("slope_of_scale", with_u("scale_mm_per_m")),
+        ("zero_of_gauge", paper.text_with_u(zero["z_mm"], zero["U_mm"])),
+        ("k", paper.word("texts.k_of_line", offset=number(line["k_offset"]),
+                         slope=number(line["k_slope"]))),
+        ("sigma0", number(line["sigma0"])),
+        ("dof", paper.number(line["dof"], decimals=0)),
+    ]  # fmt: skip
+
+
+def _slope_text(paper):
+    """Sentence on scale and plumb, from the slope."""
+    line = paper.record["line"]
+    if not line["is_slope_estimated"]:
+        return paper.word("texts.no_slope")
+    angles = {
+        name: paper.number(line[key], "deg", decimals=2)
+        for name, key in (
+            ("tilt", "tilt_deg"),
+            ("low", "U_tilt_low_deg"),
+            ("high", "U_tilt_high_deg"),
+        )
+    }
+    return paper.word(f"texts.tilt_{line['tilt_is']}", **angles)
+
+
+def _zeros(paper):
+    """Heading, sketch and table of the zeros."""
+    from tankcal.products.gauge.sketch import sketch
+
+    return [
+        blocks.with_next(paper.heading("zeros")),
+        blocks.with_next(paper.figure(sketch(paper), "gauge_sketch")),
+        blocks.whole(paper.show(ZEROS)),
+    ]
+
+
+def _head_of_liquid(paper):
+    """Movement of a gauge that the shell carries."""
+    head = paper.record["head"]
+    if head is None:
+        return []
+    return [
+        paper.paragraph(
+            "head_modelled" if head["is_modelled"] else "head_of_gauge",
+            density=paper.number(head["density_kg_m3"], "kg/m3", decimals=1),
+            top=paper.text_with_u(head["top_mm"], head["U_top_mm"]),
+            start=paper.number(head["start_m"], "m", decimals=2),
+            factor=paper.number(head["factor_mm_per_m"], decimals=4) + f"{_SPACE}mm/m",
+            off=paper.number(head["off_mm"], "image mm", decimals=3),
+        )
+    ]
+
+
+def _remarks(paper):
+    """Warnings, assumed uncertainties, standing statements and input files."""
+    gauge = paper.record
+    assumed = [
+        paper.word("texts.u_of_input", name=paper.words["u_inputs"][item["name"]],
+                   value=shortest(item["value"], paper.marks))
+        for item in gauge["uncertainties"]
+        if item["is_assumed"] and item["name"] in _inputs_in_results(gauge)
+    ]  # fmt: skip
+    texts = [paper.warning(warning) for warning in gauge["warnings"]]
+    if assumed:
+        texts.append(paper.word("texts.assumed", inputs="; ".join(assumed)))
+    texts += paper.words["standing"].values()
+    files = ", ".join(f"{item['file']} {item['sha256'][:DIGEST]}" for item in gauge["inputs"])
+    texts.append(paper.word("texts.inputs", files=bearable(files)))
+    return [paper.heading("remarks"), blocks.listing(texts)]
+
+
+def _inputs_in_results(gauge):
+    """Names of the standard uncertainties that entered a result."""
+    used = {"u_dip_mm", "u_gauge_mm", "u_tape_zero_mm", "u_tape_ppm", "u_tape_temperature_k"}
+    if gauge["reference_height_m"] is not None:
+        used.add("u_reference_mm")
+    if gauge["zeros"][1]["source"] == "reference_heights":
+        used.add("u_table_reference_mm")
+    if gauge["zeros"][1]["source"] == "levelled":
+        used |= {"u_dip_plate_mm", "u_table_zero_mm"}
+    if gauge["head"] is not None:
+        used.add("u_movement_percent")
+    return used
+
+
+def _signature(paper):
+    by = paper.record["certificate"]["by"]
+    measured = paper.word("signatures.measured")
+    labels = [f"{measured}: {bearable(by)}" if by else measured, paper.word("signatures.approved")]
+    return blocks.signature(labels, paper.word("dcc.sign_here"))
+
+
+def write_workbook(paper, path):
+    """Write the workbook of a `GaugePaper`; equal data give equal bytes."""
+    from tankcal.report.workbook.book import workbook_head
+    from tankcal.report.workbook.sections import write_workbook as write
+
+    gauge = paper.record
+    head = workbook_head(
+        gauge["tankcal"], tank=gauge["tank"], date=gauge["certificate"]["date"],
+        notice=gauge["notice"],
+        laboratory=paper.letterhead["name"] if paper.letterhead else "",
+    )  # fmt: skip
+    write(paper, path, "gauge", head, _sheets)
+
+
+def _sheets(book):
+    """Yield the content of each sheet, in order."""
+    from tankcal.report.workbook.sections import Facts, Sentences, SheetContent, cell_table
+
+    paper = book.paper
+    labels = [(paper.label(key), value, None)
+              for key, value in (*_facts(paper), *_line(paper)) if value]  # fmt: skip
+    decision = paper.decision()
+    parts = [Facts(labels), *([Sentences([decision])] if decision else [])]
+    yield SheetContent("gauge_result", parts, landscape=False, widths=(42, 58))
+    for code, table in (
+        ("gauge_corrections", CORRECTIONS),
+        ("gauge_levels", LEVELS),
+        ("gauge_zeros", ZEROS),
+        ("gauge_budget", BUDGET),
+    ):
+        yield SheetContent(code, [cell_table(book, table)], tab="result")
+
+
+DOCUMENT = SavedDocument(
+    GAUGE,
+    GaugePaper,
+    lambda: (pages, write_workbook),
+    steps=(
+        message("gauge_tables", "writing the tables of the gauge"),
+        message("gauge_papers", "setting the certificate of the gauge"),
+    ),
+    unreadable=lambda error: message(
+        "gauge_unreadable", "cannot be read as a comparison of a gauge: {error}", error=error
+    ),
+    without_content=lambda what: message(
+        "no_gauge", "does not have the content of a comparison of a gauge ({what})", what=what
+    ),
+    tables=FILES,
+    has_page=False,
+)
