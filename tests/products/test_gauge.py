@@ -8,7 +8,6 @@ import subprocess
 import numpy as np
 import pytest
 from scipy import stats
-from tankcal.text.languages import LANGUAGES
 
 from tankcal.cli import main
 from tankcal.errors import InputError
@@ -28,6 +27,7 @@ from tankcal.products.gauge.reading import UNCERTAINTIES, read_comparison
 from tankcal.products.gauge.starter import write_starter
 from tankcal.record.schema import to_plain
 from tankcal.report.verification import verify
+from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import load_words
 
 SETTINGS = {

@@ -11,7 +11,7 @@ from tankcal.report.plain import words_with_part
 from tankcal.report.saved_document import SavedDocument
 from tankcal.report.saved_paper import SavedPaper, bearable
 from tankcal.text.digits import format_with_u, shortest
-from tankcal.text.languages import DEFAULT
+from tankcal.text.shipped import DEFAULT
 from tankcal.text.words import load_words
 
 FILE, WORKBOOK = "gauge.json", "gauge.xlsx"

@@ -20,7 +20,7 @@ from tankcal.messages import message
 from tankcal.products.gauge.deviation import LEAST_LEVELS, Dips, KnownSlope, slope_of_tilt
 from tankcal.products.settings import read_sections
 from tankcal.tank import gauging
-from tankcal.text.languages import LANGUAGES
+from tankcal.text.shipped import LANGUAGES
 
 SETTINGS, READINGS = "gauge.toml", "readings.csv"
 SUPPORTS = ("bottom", "shell")
