@@ -161,8 +161,8 @@ def test_figures_of_closed_forms():
     assert rounded([one, one / 4], printed[2:]) == printed[2:]
     printed = figures_of(
         "docs/rings.md",
-        "p R² / (E t). This is () mm for R () m, () bar and () mm, and () mm for R () m, () bar and "
-        "() mm (E = 206 GPa)",
+        "p R² / (E t). This is () mm for R () m, () bar and () mm, and () mm for R () m, "
+        "() bar and () mm (E = 206 GPa)",
     )
     for bulge, *sizes in (printed[:4], printed[4:]):
         radius, bar, plate = map(float, sizes)
