@@ -229,14 +229,14 @@ def _list_falls(volumes):
 # ---- valid inputs
 
 
-MAKERS = ("runs", "results", "plans", "tables", "imports", "cameras", "answers")
+MAKERS = ("runs", "results", "quantities", "plans", "tables", "imports", "cameras", "answers")
 
 
 DEAR = (  # a valid input takes a second of processor time or more; the command has another base
     "run liquid", "run liquid-lying", "run ship", "run tangents", "run total-station",
     "run wall-hits", "run silva-1995-photos", "run cloud", "run rings", "run strict", "report",
     "plan reference-line", "plan wall-hits", "plan tangents", "plan liquid", "plan silva",
-    "read-table lying", "camera influence", "answer",
+    "read-table lying", "camera influence", "answer", "ticket document",
 )  # fmt: skip
 
 
@@ -399,6 +399,60 @@ def _adjusted_record(folder):
     write_tree(folder, read_example("silva-1995-photos"))
     assert cli.main(["run", str(folder), "--only", "adjustment", "--no-papers", "--quiet"]) == 0
     return {"record.json": (folder / "results" / "record.json").read_bytes()}
+
+
+TICKET = b"""
+[ticket]
+number = "2026-118"
+date = 2026-05-03
+
+[product]
+name = "diesel"
+correction = "D1250-04"
+group = "products"
+base = "20C"
+density_kg_m3 = 835.2
+density_is = "observed"
+density_temperature_c = 27.5
+sw_percent = 0.05
+
+[opening]
+dip_m = 2.317
+water_dip_m = 0.012
+temperature_c = 28.4
+ambient_c = 25.0
+
+[closing]
+dip_m = 6.642
+water_dip_m = 0.012
+temperature_c = 31.2
+ambient_c = 29.0
+
+[compared]
+quantity = "nsv_m3"
+value = 680.0
+U = 1.2
+source = "meter"
+"""
+TICKETS = b"ticket,opening_dip_m,closing_dip_m,closing_temperature_c\na,2.1,5.2,30\nb,1.5,,28.5\n"
+
+
+def _make_quantities(folder):
+    """Commands from the table of a record to the quantity."""
+    write_tree(folder, read_example("strapping"))
+    assert cli.main(["run", str(folder), "--no-papers", "--quiet"]) == 0
+    record = {"record.json": (folder / "results" / "record.json").read_bytes()}
+    ticket = record | {"ticket.toml": TICKET}
+    command = ("ticket", "{in}/record.json", "{in}/ticket.toml")
+    return {
+        "ticket": Base((*command, "--json"), ticket, ("ticket.toml",), complains=False),
+        "ticket record": Base((*command, "--json"), ticket, ("record.json",), complains=False),
+        "ticket many": Base(
+            (*command, "--tickets", "{in}/tickets.csv", "--out", "{out}/quantities.csv"),
+            ticket | {"tickets.csv": TICKETS}, ("ticket.toml", "tickets.csv"), complains=False),
+        "ticket document": Base((*command, "--quiet", "--out", "{out}"), ticket,
+                                ("ticket.toml",), complains=False),
+    }  # fmt: skip
 
 
 def _make_plans(_):
