@@ -14,10 +14,16 @@ from scipy.spatial import ConvexHull
 from tankcal.geometry.field.amplitudes import Amplitudes
 from tankcal.geometry.field.components import COMPONENTS, OVALITY_MODES
 from tankcal.geometry.girth import Ring, _support_at, tangent_excess
-from tankcal.geometry.support import fit_support, support_columns
 from tankcal.survey.measurements import Setup
 from tankcal.survey.sighting import NETWORK, Poses
-from tankcal.survey.tangents import Tangents, circle_of_sights, normals_of, touch
+from tankcal.survey.tangents import (
+    Tangents,
+    circle_of_sights,
+    fit_support,
+    normals_of,
+    support_columns,
+    touch,
+)
 
 RHO, XC, YC, P2, Q2 = 10.012, 0.020, -0.010, -0.005526366, 0.002336510
 SIGHTS = {  # azimuth of the station: of its sights to the left and the right limb, degrees

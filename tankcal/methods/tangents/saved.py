@@ -172,7 +172,7 @@ def _levels(result, tests):
 
 def _curve(touching, mine):
     """Highest wave, and `SupportCurve` of some tangents; None: they do not determine it."""
-    from tankcal.geometry.support import fit_support
+    from tankcal.survey.tangents import fit_support
 
     order = int(np.clip(len(mine) // PER_WAVE - 1, 1, MOST_WAVES))
     f, support = touching.normal_rad[mine], touching.support_m[mine]

@@ -39,8 +39,7 @@ from tankcal.tank.liquid import (
     reading_effects,
     reduce_steps,
 )
-from tankcal.tank.liquid.readings import ReadingEffects
-from tankcal.tank.liquid.reduction import load_densities
+from tankcal.tank.liquid.reduction import ReadingEffects, load_densities
 from tankcal.uncertainty import Source
 
 MOST_ROUNDS, SETTLED = 30, 1e-3  # largest number of steps of the sizes, and size of the last in sds

@@ -36,7 +36,7 @@ from tankcal.pipeline.liquid.result import (
 from tankcal.pipeline.tanks import body_of, filled_with, zero_height
 from tankcal.pipeline.tanks.corrections import Correction
 from tankcal.tank.liquid import fill_of, name_causes
-from tankcal.tank.liquid.readings import batch_sd_m3
+from tankcal.tank.liquid.reduction import batch_sd_m3
 
 ISO_4269 = "ISO 4269:2001"
 OF_NO_WEIGHT_M = 1.0  # standard deviation of a dip without weight, m

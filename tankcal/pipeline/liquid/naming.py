@@ -4,7 +4,7 @@ import numpy as np
 
 from tankcal.messages import join_with_or, message
 from tankcal.tank.liquid import Alternative, reduce_steps
-from tankcal.tank.liquid.readings import as_fahrenheit, swapped
+from tankcal.tank.liquid.reduction import as_fahrenheit, swapped
 
 MOST_TOLD = 3  # largest number of kinds of causes in a sentence
 # Largest plausible errors: relative, of a meter factor; in m, of a zero, a dip or a radius.

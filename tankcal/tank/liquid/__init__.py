@@ -19,8 +19,14 @@ from tankcal.tank.liquid.adjustment import (
     estimate_run_effect,
     name_causes,
 )
-from tankcal.tank.liquid.readings import ReadingEffects, reading_effects
-from tankcal.tank.liquid.reduction import Fill, ReducedSteps, fill_of, reduce_steps
+from tankcal.tank.liquid.reduction import (
+    Fill,
+    ReadingEffects,
+    ReducedSteps,
+    fill_of,
+    reading_effects,
+    reduce_steps,
+)
 
 __all__ = [
     "Alternative",
