@@ -3,7 +3,7 @@
     rho(Tm) [f (1 + g) v + n] = rho(T_k) W_k - rho(T_k-1) W_k-1,   W = c(Ts) V(h),
     rho(T) = rho_0 (1 - b (T - T_0))
 
-at the temperature of the table. Division by rho(T_k) c_k gives a step
+Steps are at the temperature of the table. Division by rho(T_k) c_k gives a step
 
     f v m / c_k = V(h_k) - q_k V(h_k-1),   m = rho(Tm) / rho(T_k),
     q = rho(T_k-1) c_k-1 / (rho(T_k) c_k).
