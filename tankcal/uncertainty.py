@@ -352,7 +352,7 @@ def check_sensitivities(model, x, u, sensitivities, names=None):
         raise ValueError(f"sensitivities {sensitivities.shape}, expected {estimates.slopes.shape}")
     deviation = np.abs(sensitivities - estimates.slopes)
     # The deviation counts only beyond the error of the differences.
-    wrong = (deviation - estimates.doubt) * u > _AGREEMENT * _combined_uncertainty(
+    wrong = (deviation - estimates.doubt) * u > _AGREEMENT * _combine_without_correlations(
         estimates.slopes, u
     )
     _refuse(wrong, deviation, names, "contradicted by differences over")
@@ -407,7 +407,7 @@ def _differences_over(model, x, u, middle, steps, reach=None):
     # Richardson: the error is quadratic in the step.
     slopes = fine + (fine - coarse) / 3
     rounding = _ROUNDING * np.abs(middle)[:, None] / steps
-    allowed = _AGREEMENT * np.maximum(_combined_uncertainty(slopes, u), reach)
+    allowed = _AGREEMENT * np.maximum(_combine_without_correlations(slopes, u), reach)
     curved = np.abs(fine - coarse)
     # Halving the step halves the difference of both slopes for a curve, but not for a kink.
     kink = (np.abs(finer_bend) > 0.75 * np.abs(bend)) & (
@@ -437,7 +437,7 @@ def _choose_steps(x, u):
     return np.where(u > 0, np.maximum(u / 4, 2**14 * np.spacing(np.abs(x))), least)
 
 
-def _combined_uncertainty(slopes, u):
+def _combine_without_correlations(slopes, u):
     """Standard uncertainty (rows, 1) of each output, without correlations."""
     return np.sqrt(np.sum((slopes * u) ** 2, axis=1, keepdims=True))
 

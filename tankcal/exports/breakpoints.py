@@ -159,7 +159,7 @@ def best_breakpoints(height, volume, points, *, fixed=(), at=None, written=None,
     ([0, 2, 4], 1.0)
     """
     table = _table(height, volume, fixed, at, written, candidates)
-    least = int(np.count_nonzero(_required_rows(table)))
+    least = int(np.count_nonzero(_mark_required_rows(table)))
     if points < least:
         raise ValueError(f"{points} points, expected {least} or more: so many rows have to stand")
     rows, greedy = _greedy(table, points)
@@ -240,7 +240,7 @@ def _next_fixed(required):
     return fixed[np.minimum(place, len(fixed) - 1)]
 
 
-def _required_rows(table):
+def _mark_required_rows(table):
     required = np.zeros(len(table.height), dtype=bool)
     required[table.last] = required[0] = True
     return required
@@ -264,7 +264,7 @@ def _fewest_chords_path(table, eps, most):
     None if there is none.
     """
     is_open = _open_rows(table, eps)
-    if not np.all(is_open[_required_rows(table)]):
+    if not np.all(is_open[_mark_required_rows(table)]):
         return None
     fewest, before = table.fewest_chords(is_open, eps, most)
     return _trace_path(before) if fewest[-1] <= most else None
@@ -305,7 +305,7 @@ def _greedy_path(table, points):
 def _longest_chords_path(table, eps):
     """Rows of the longest chords within eps; empty if a required row has a larger error."""
     is_open = _open_rows(table, eps)
-    return table.longest_chords(is_open, eps) if np.all(is_open[_required_rows(table)]) else ()
+    return table.longest_chords(is_open, eps) if np.all(is_open[_mark_required_rows(table)]) else ()
 
 
 def _optimum(table, points, rows):

@@ -318,7 +318,7 @@ class RowRequest:
             text = message("export_no_zero", "the table begins at {at:.6g} m; expected a row of "
                            "dip 0", at=self.height[0])  # fmt: skip
             self.report(text, "table.zero_row")
-        required = self._required_rows()
+        required = self._find_required_rows()
         marks = make_marks(self.height, self.volume, profile, reference, required)
         missing = [row for row in required if not marks.permitted[row]]
         if missing:
@@ -330,7 +330,7 @@ class RowRequest:
             marks.at_m[0], marks.written_m3[0] = 0.0, 0.0  # required first row of such a system
         return marks, required
 
-    def _required_rows(self):
+    def _find_required_rows(self):
         """Required rows: the ends, and rows about the critical zone of a roof."""
         required = {0, len(self.height) - 1}
         for_use = np.array(self.record.capacity.for_use, dtype=bool)

@@ -127,7 +127,7 @@ def _fit_distances(local, covariance_m2, start):
         )
         # A damped step reduces the sum of squares even where the full step of `adjust` does not.
         lower = scipy.linalg.cholesky(variances, lower=True)
-        unknowns = _damped_circle(local, lower, previous)
+        unknowns = _fit_damped(local, lower, previous)
         if np.allclose(unknowns, previous, rtol=0, atol=SETTLED_M):
             break
     # Linearise once more at the solution: L^-1 v and L^-1 A give chi2 and the cofactor (A' Q^-1
@@ -147,7 +147,7 @@ def _fit_distances(local, covariance_m2, start):
     )
 
 
-def _damped_circle(local, lower, start):
+def _fit_damped(local, lower, start):
     """Minimise the whitened misclosures of `_conditions_of_points` (Levenberg-Marquardt)."""
     import scipy.optimize  # slow to import and needed only where the ordinary iteration fails
 

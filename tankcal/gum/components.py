@@ -481,7 +481,7 @@ class Shares:
         return {
             "contribution": float(max(square, 0.0) ** 0.5),
             "share": float(variance / self._variance) if self._variance > 0 else 0.0,
-            "halved": self._expanded_for(changed) / self.U if self.U > 0 else 1.0,
+            "halved": self._compute_U_for(changed) / self.U if self.U > 0 else 1.0,
         }
 
     def _parts_of(self, number, chosen):
@@ -504,7 +504,7 @@ class Shares:
             half @ source.correlation @ half,
         )
 
-    def _expanded_for(self, variances):
+    def _compute_U_for(self, variances):
         """Expanded uncertainty for other variances of the sources."""
         return float(Combined(variances[None, :], self._found.dof).expanded(self.probability)[0])
 

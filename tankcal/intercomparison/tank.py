@@ -270,7 +270,7 @@ class Tank:
                 for item, rho in zip(levels, density * f, strict=True)
             ]
         )
-        cool += self._floor_m3(2) if more else self._below_foot_m3
+        cool += self._floor_m3(2) if more else self._volume_below_foot_m3
         for item in self.fittings:
             part = np.clip((levels - item.low_m) / (item.high_m - item.low_m), 0, 1)
             cool += item.volume_m3 * part
@@ -337,7 +337,7 @@ class Tank:
         return area + out * length + np.pi * out**2
 
     @cached_property
-    def _below_foot_m3(self):
+    def _volume_below_foot_m3(self):
         """Volume between the bottom and the plane of the foot, m3."""
         return self._floor_m3(1)
 

@@ -69,10 +69,10 @@ def assemble_plan(job, plan_input, bars, folder):
         ties.append(tie)
         extra |= ends
         facing |= dict.fromkeys(ends, out)
-    ties += _listed_ties(plan_input.ties)
+    ties += _list_ties(plan_input.ties)
     places = dict(zip(targets.names, targets.xyz_m, strict=True)) | extra
     places |= {setup.name: setup.xyz_m for setup in setups}
-    known = _known_points(job.measurements.control, places)
+    known = _complete_known_points(job.measurements.control, places)
     extra |= {
         point.name: point.xyz_m
         for point in known
@@ -329,7 +329,7 @@ def tape_of(tape, shell):
     return tie, dict(zip(names, ends, strict=True)), out
 
 
-def _listed_ties(tables):
+def _list_ties(tables):
     """Return the ties listed in the tables of a plan."""
     ties = []
     for name, table in tables.items():
@@ -347,7 +347,7 @@ def _listed_ties(tables):
     return ties
 
 
-def _known_points(control, places):
+def _complete_known_points(control, places):
     """Return the known points; a blank coordinate takes its nominal value where the plan has it.
 
     A check point (use = "check") has a position, but no standard deviations: it does not constrain

@@ -238,13 +238,17 @@ def _best(effects, now, limit, add):
     for effect in _candidates(effects, now, limit, add):
         after = predict(effect.change.plan)
         u = after.relative_u
-        if u < now.relative_u if add else u <= limit and _uncontrolled(after) <= _uncontrolled(now):
+        if (
+            u < now.relative_u
+            if add
+            else u <= limit and _count_uncontrolled(after) <= _count_uncontrolled(now)
+        ):
             top = float(after.table.U_m3[-1])
             return replace(effect, relative_u=u, difference=u - now.relative_u, U_m3=top), after
     return None, None
 
 
-def _uncontrolled(prediction):
+def _count_uncontrolled(prediction):
     """Number of uncontrolled readings."""
     return sum(group.uncontrolled for group in prediction.reliability)
 

@@ -311,9 +311,9 @@ def list_warnings(prediction):
     )
     return (
         *prediction.plan.warnings,
-        *_undetermined_targets(prediction),
+        *_warn_about_undetermined_targets(prediction),
         *warnings_of_idle_ties(prediction.plan, prediction.points),
-        *_uncontrolled(prediction.reliability),
+        *_warn_about_uncontrolled(prediction.reliability),
         *check_bases(prediction.measurements),
         *(
             replace(problem, file=PLAN_FILE) if problem.file == SETTINGS_FILE else problem
@@ -322,7 +322,7 @@ def list_warnings(prediction):
     )
 
 
-def _undetermined_targets(prediction):
+def _warn_about_undetermined_targets(prediction):
     """Return a Problem about targets that are not determined."""
     targets = set(prediction.plan.targets.names)
     lost = [point.name for point in prediction.undetermined if point.name in targets]
@@ -365,7 +365,7 @@ def warnings_of_idle_ties(plan, points):
     return (Problem(PLAN_FILE, text),)
 
 
-def _uncontrolled(groups):
+def _warn_about_uncontrolled(groups):
     """Return a Problem about kinds of readings (`GroupReliability`) with uncontrolled values."""
     idle = [_describe_group(group) for group in groups if group.uncontrolled]
     if not idle:

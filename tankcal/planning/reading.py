@@ -131,7 +131,7 @@ def load_plan(path):
     plan = assemble_plan(job, plan_input, bars_of(registers), folder.resolve().name)
     check_positions(plan, plan_input, raw, log)
     log.stop_if_problems()
-    return replace(plan, raw=_with_points(raw), warnings=tuple(log.warnings))
+    return replace(plan, raw=_use_decimal_points(raw), warnings=tuple(log.warnings))
 
 
 def _wall_plan(raw, values, tables, plan_input, folder, log):
@@ -141,7 +141,7 @@ def _wall_plan(raw, values, tables, plan_input, folder, log):
     check_sections(plan_input, courses, None if diameter is None else diameter / 2, raw, log)
     log.stop_if_problems()
     warnings = tuple(log.warnings)
-    raw = _with_points(raw)
+    raw = _use_decimal_points(raw)
     check_tank(values, tables, raw, log)
     log.stop_if_problems()
     limits = limits_of(plan_input.sections["limits"])
@@ -175,7 +175,7 @@ def _check_kind(raw, plan_input, log):
     log.problem(PLAN_FILE, expected, None, "tank.kind")
 
 
-def _with_points(raw):
+def _use_decimal_points(raw):
     """Return the RawJob with decimal points in its tables and no declared marks."""
     settings = {name: entries for name, entries in raw.settings.items() if name != "csv"}
     tables = {

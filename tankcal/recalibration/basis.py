@@ -279,9 +279,9 @@ def bring_to_one_basis(former, new, facts):
     InputError
         If the tables have fewer than two rows in common.
     """
-    zero = _declared_zero(former, new)
+    zero = _find_declared_zero(former, new)
     densities = find_densities(former, new, facts)
-    fitted = _fitted_zero(former, new, facts, densities)
+    fitted = _fit_zero(former, new, facts, densities)
     if zero is None and fitted is not None:
         least = max(NOTICED * fitted[1], LEAST_ZERO_M)
         zero = fitted[0] if abs(fitted[0]) > least else None
@@ -365,13 +365,13 @@ def rounding_sd_m3(former, new):
 # ---- the zero
 
 
-def _declared_zero(former, new):
+def _find_declared_zero(former, new):
     if former.reference_height_m is None or new.reference_height_m is None:
         return None
     return former.reference_height_m - new.reference_height_m
 
 
-def _fitted_zero(former, new, facts, densities):
+def _fit_zero(former, new, facts, densities):
     """Fit the height of the new zero above the former one to the volumes: (height, u), or None."""
     zero, sd_m3 = 0.0, rounding_sd_m3(former, new)
     # The area depends on the zero, so the linear adjustment is repeated.
@@ -393,7 +393,7 @@ def _fitted_zero(former, new, facts, densities):
 
 
 def _zero_shift(former, new, zero, fitted, rows):
-    is_declared = _declared_zero(former, new) is not None
+    is_declared = _find_declared_zero(former, new) is not None
     area = slopes_m2(new.height_m, new.volume_m3)[rows]
     source = "reference_heights" if is_declared else "none" if zero is None else "fitted"
     return ZeroShift(

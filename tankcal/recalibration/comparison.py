@@ -112,7 +112,7 @@ def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
     >>> result.verdict, round(float(result.rows.d_m3[-1]), 3), round(float(result.rows.E_n[-1]), 2)
     ('keep', 0.4, 0.2)
     """
-    c = _declared_correlation(former, new)
+    c = _find_correlation(former, new)
     _refuse_other_kinds(former, new)
     facts = collect_facts(former, new, courses)
     chosen, file = rule or named_rule(DEFAULT_RULE, Log())
@@ -155,7 +155,7 @@ def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
         verdict=verdict.code,
         verified=verdict.verified,
         reasons=list(verdict.reasons),
-        read=_estimated_values(former, new, basis),
+        read=_list_estimated_values(former, new, basis),
         warnings=warnings_of(_warnings(former, new, basis)),
     )
 
@@ -163,7 +163,7 @@ def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
 # ---- tables that cannot be compared
 
 
-def _declared_correlation(former, new):
+def _find_correlation(former, new):
     """FormerFacts correlation of the tables, or None."""
     former_c, new_c = former.common, new.common
     if former_c is not None and new_c is not None and former_c != new_c:
@@ -373,7 +373,7 @@ def _notice(former, new):
     return next(filter(None, notices), "")
 
 
-def _estimated_values(former, new, basis):
+def _list_estimated_values(former, new, basis):
     """Return the values that were estimated from the tables because they are not declared."""
     estimates = []
     for name, density in zip(("former", "new"), basis.densities, strict=True):

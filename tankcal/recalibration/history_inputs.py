@@ -210,7 +210,7 @@ def _read(archive, path, name, is_searched):
         _add_former(archive, path, name)
         return
     data = path.read_bytes()
-    content = data if find_encoding(data) == "utf-8" else _to_utf8(data, path)
+    content = data if find_encoding(data) == "utf-8" else _encode_utf8(data, path)
     if (
         is_searched
         and archive.tanks
@@ -241,7 +241,7 @@ def _may_name(content, tank):
     )
 
 
-def _to_utf8(data, path):
+def _encode_utf8(data, path):
     try:
         return decode_text(data).encode("utf-8")
     except ValueError as error:

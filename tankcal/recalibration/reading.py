@@ -62,7 +62,7 @@ def read_former(path, former_toml=None) -> FormerTable:
     if former_toml is None and path.suffix.lower() == ".toml":
         former_toml = path
         declared = read_former_facts(path, log)
-        path = _named_file(declared, path, log)
+        path = _find_named_file(declared, path, log)
     elif former_toml is not None:
         declared = read_former_facts(former_toml, log)
         _check_name(declared, path, log)
@@ -81,7 +81,7 @@ def read_former(path, former_toml=None) -> FormerTable:
     return replace(former, warnings=warnings + tuple(log.warnings))
 
 
-def _named_file(declared, path, log):
+def _find_named_file(declared, path, log):
     """Return the file of the table named in a former.toml; raise InputError if none is named."""
     if declared["file"] is None:
         if not log.problems:

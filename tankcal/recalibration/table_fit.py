@@ -461,10 +461,10 @@ def u_factors(solution, rows, quantum_m3):
     quantum_m3 : float
         Value of the last printed digit; 0: not rounded.
     """
-    return np.maximum(_simulated_factors(solution, rows, quantum_m3), roughness(solution, rows))
+    return np.maximum(_simulate_factors(solution, rows, quantum_m3), roughness(solution, rows))
 
 
-def _simulated_factors(solution, rows, quantum):
+def _simulate_factors(solution, rows, quantum):
     sds = np.sqrt(np.diag(solution.cofactor))
     if quantum <= 0 or solution.dof <= 0:
         return np.ones(len(sds))

@@ -197,7 +197,7 @@ class SolidPart(Part):
         if self.form is None:
             return area
         volume = self.solid.volume_m3(self._solid_levels(levels_m))
-        return self._formed_area(levels_m, volume, area)
+        return self._area_of_form(levels_m, volume, area)
 
     def derivatives(self, levels_m):
         """Return {input: (rows,)}, m3 per SI unit, by measured inputs and temperature."""
@@ -252,7 +252,7 @@ class SolidPart(Part):
         share, _ = self.solid.height_share(self._solid_levels(levels_m))
         return share
 
-    def _formed_area(self, levels_m, volume, area):
+    def _area_of_form(self, levels_m, volume, area):
         """Return the area of the wall, from volume and area of the solid."""
         shares, by_level = self.solid.height_share(self._solid_levels(levels_m))
         # Product rule: V = W(L / s) f(share), with s the stretch of the dips.
@@ -269,7 +269,7 @@ class SolidPart(Part):
             return derivatives
         levels, factor = self._solid_levels(levels_m), self.form.factor(self._shares(levels_m))
         volume = self.solid.volume_m3(levels)
-        area = self._formed_area(levels_m, volume, derivatives["datum"])
+        area = self._area_of_form(levels_m, volume, derivatives["datum"])
         formed = {name: factor * derivative for name, derivative in derivatives.items()}
         by_scale = 3 * factor * volume - np.asarray(levels_m) * area
         return formed | {"datum": area, "scale": by_scale}

@@ -176,7 +176,7 @@ class CsvLines:
         if self.heading is None:
             copy_until(None)
             if table.headings:
-                emit(self.separator.join(map(self._quoted, table.headings)))
+                emit(self.separator.join(map(self._quote_cell, table.headings)))
         else:
             copy_until(self.heading)
             emit(self._heading_of(table), self.endings[self.heading])
@@ -205,12 +205,12 @@ class CsvLines:
     def _heading_of(self, table):
         """Line of headings with added columns."""
         added = [heading for heading in table.headings[len(self.before) :] if heading]
-        return self.separator.join((self.lines[self.heading], *map(self._quoted, added)))
+        return self.separator.join((self.lines[self.heading], *map(self._quote_cell, added)))
 
     def _text_of(self, row):
         """Line of a row, in which only changed cells differ from the file."""
         if row.line is None:
-            return self.separator.join(map(self._quoted, row.cells))
+            return self.separator.join(map(self._quote_cell, row.cells))
         line = self.lines[row.line]
         if not row.changed:
             return line
@@ -218,10 +218,10 @@ class CsvLines:
         parts += [""] * (len(row.cells) - len(parts))
         for column in row.changed:
             if cell_of(parts[column]) != row.cells[column]:
-                parts[column] = self._quoted(row.cells[column])
+                parts[column] = self._quote_cell(row.cells[column])
         return self.separator.join(parts)
 
-    def _quoted(self, text):
+    def _quote_cell(self, text):
         """Text of a cell in the file, with quotation marks if required; "" if ambiguous."""
         if isinstance(text, AmbiguousNumber):
             return ""

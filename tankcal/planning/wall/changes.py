@@ -252,7 +252,7 @@ def _runs(plan):
 
         for action, dips in _ends(run.dips_m, top):
             yield action, "step", name, change_run(dips_m=dips)
-        to_top = _to_top(run.dips_m, top)
+        to_top = _extend_to_top(run.dips_m, top)
         if to_top is not None:
             yield "add", "top_of_run", name, change_run(dips_m=to_top)
         halves = _halves(run.dips_m)
@@ -303,7 +303,7 @@ def _ends(dips, top):
             yield "drop", dips[:-1]
 
 
-def _to_top(dips, top):
+def _extend_to_top(dips, top):
     """Extend dips to the full tank in steps of the last size; None if full already or falling."""
     if len(dips) < 2 or dips[-1] < dips[-2] or top - dips[-1] < LEAST_STEP_M:
         return None

@@ -52,7 +52,7 @@ def check_runs(plan_input, is_run_declared, log):
     for entry in runs:
         _check_steps(entry, log)
     _check_run_effect(plan_input, is_run_declared, log)
-    rows = sum(len(run.dips_m) + 1 for run in map(_planned, runs) if run is not None)
+    rows = sum(len(run.dips_m) + 1 for run in map(_make_run, runs) if run is not None)
     if rows > MOST_ROWS:
         expected = message(
             "plan_many_batches",
@@ -119,10 +119,10 @@ def _check_run_effect(plan_input, is_declared, log):
 
 def runs_of(entries, celsius):
     """Return the `PlannedRun`s of valid [[runs]], a tuple; celsius: temperature of the table."""
-    return tuple(_planned(entry, celsius) for entry in entries)
+    return tuple(_make_run(entry, celsius) for entry in entries)
 
 
-def _planned(entry, celsius=None):
+def _make_run(entry, celsius=None):
     """Return the PlannedRun of an Entry; None if the entry is invalid."""
     first, last = entry["first_dip_m"], entry["last_dip_m"]
     step, steps = entry["step_m"], entry["steps"]
@@ -365,7 +365,7 @@ def refuse_other_dips(dips_m, table):
         raise InputError(Problem(PLAN_FILE, expected, None, "filling.dips_m"))
 
 
-def _expanded(body, levels, table, weights=None):
+def _compute_U(body, levels, table, weights=None):
     """U (n,) of volumes at levels, or of their weighted sums."""
     levels = np.clip(levels, body.lowest_m, body.highest_m)
     sources = body.sources(levels)
@@ -381,7 +381,7 @@ def _rows(plan, bodies, dips, table):
     low, high = filled_range_m(plan.job.liquid)
     inside = (dips >= low - SAME_M) & (dips <= high + SAME_M)
     U_of = {
-        name: np.full(len(dips), np.nan) if body is None else _expanded(body, levels, table)
+        name: np.full(len(dips), np.nan) if body is None else _compute_U(body, levels, table)
         for name, body in bodies.items()
     }
     liquid = np.where(inside, U_of["liquid"], np.nan)
@@ -405,7 +405,7 @@ def _differences(bodies, dips, table):
     levels, over = dips + table.zero_m, np.diff(np.eye(len(dips)), axis=0)
     joint, geometry = bodies["joint"], bodies["geometry"]
     volumes = over @ joint.volume_m3(np.clip(levels, None, joint.highest_m))
-    before, expanded = (_expanded(body, levels, table, over) for body in (geometry, joint))
+    before, expanded = (_compute_U(body, levels, table, over) for body in (geometry, joint))
     columns = (pairwise(dips), volumes, before, expanded)
     return tuple(
         DifferenceOutlook(float(low), float(high), float(volume), float(by_geometry), float(U))
@@ -422,13 +422,13 @@ def _causes(result):
     columns = next((effect.columns.T for effect in effects), None)
     for number, name in enumerate(fill.meters):
         u = 1e6 * metering.meters[name].u_factor
-        left = 1.0 if columns is None else _left(adjusted, columns[number])
+        left = 1.0 if columns is None else _ratio_of_u(adjusted, columns[number])
         outlooks.append(CauseOutlook("meter_factor", name, "ppm", u, u * left))
     of_geometry = [source for source in result.known.sources if not source.parts]
     of_liquid = [cause for cause in result.known.liquid if cause.kind != "meter_factor"]
     for cause in (*of_geometry, *of_liquid):
         if cause.u and cause.unit and cause.columns_m3.shape[1] == 1:
-            left = _left(adjusted, cause.columns_m3[:, 0])
+            left = _ratio_of_u(adjusted, cause.columns_m3[:, 0])
             if left < 1 - LEAST_SHARE:
                 name = cause.note if cause.kind.startswith(OF_INSTRUMENTS) else ""
                 u = float(cause.u)
@@ -436,7 +436,7 @@ def _causes(result):
     return tuple(outlooks)
 
 
-def _left(adjusted, column):
+def _ratio_of_u(adjusted, column):
     """Ratio of the u of a cause after to before.
 
     Column (n,): effect of one u on the misclosures.

@@ -262,10 +262,10 @@ def loft(bands):
             [*bands[-1].centre_m[-1], bands[-1].heights_m[-1]],
         ]
     )
-    return closed_mesh(np.concatenate([wall, ends]), _lofted_faces(len(wall), count), name="loft")
+    return closed_mesh(np.concatenate([wall, ends]), _make_faces(len(wall), count), name="loft")
 
 
-def _lofted_faces(vertices, count):
+def _make_faces(vertices, count):
     """Return faces (m, 3) of `vertices` in rings of `count`, then the centres of bottom and lid."""
     index = np.arange(count)
     next_index = np.roll(index, -1)

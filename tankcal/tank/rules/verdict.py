@@ -370,7 +370,7 @@ def _judge_deliveries(limit, table, capacity, printed):
     if worst_of_table is None:
         return UncertaintyVerdict(limit, "nothing_to_judge", None)
     is_relative = limit.relative_to == "itself" or limit.limit is None
-    judged = _printed_deliveries(
+    judged = _list_printed_deliveries(
         worst_of_table.relative if is_relative else worst_of_table.absolute, limit, table, printed
     )
 
@@ -399,7 +399,7 @@ def _judge_deliveries(limit, table, capacity, printed):
     return _delivery_verdict(limit, code, worst, ratio, from_m)
 
 
-def _printed_deliveries(worst, limit, table, printed):
+def _list_printed_deliveries(worst, limit, table, printed):
     """Return the worst Delivery of the table and all simulated deliveries, with their printed U."""
     first, last = table.height_m[[0, -1]]
     least = limit.minimum_height_m - _SAME_M

@@ -121,7 +121,7 @@ class LiquefiedGas:
 
         def density_at(temperature_k):
             reduced = 1 - temperature_k / critical_k
-            rho_light, rho_heavy = (_saturated(fluid, reduced) for fluid in (light, heavy))
+            rho_light, rho_heavy = (_saturation_density(fluid, reduced) for fluid in (light, heavy))
             return rho_light / (1 + weight * (rho_light / (ratio * rho_heavy) - 1))
 
         return density_at(temperature_c + 273.15) / density_at(BASE_K)
@@ -137,7 +137,7 @@ class LiquefiedGas:
         refuse_outside("pressure_kpa", pressure_kpa, 0.0, 0.0, "kPa", self.name)
 
 
-def _saturated(fluid, reduced):
+def _saturation_density(fluid, reduced):
     """Saturation density of a reference fluid at the reduced temperature 1 - T / Tc, mol/L."""
     critical, k1, k2, k3, k4 = fluid[3:]
     # Above the critical point there is no liquid; the range excludes it.
