@@ -172,12 +172,12 @@ class Covariances:
     def _seams(self, members):
         """Return c of seams between some sites."""
         if self._in_order and isinstance(members, slice):
-            return self._seam_correlations_between[members, members]
+            return self._seam_correlations[members, members]
         place = self.place[members]
-        return self._seam_correlations_between[place[:, None], place]
+        return self._seam_correlations[place[:, None], place]
 
     @cached_property
-    def _seam_correlations_between(self):
+    def _seam_correlations(self):
         """Return c of seams between the distinct azimuths."""
         return seam_correlations(self.azimuths_rad, self.azimuths_rad, self.nominal_m)
 

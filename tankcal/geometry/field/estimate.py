@@ -138,7 +138,7 @@ class WallField:
                 outlines[course] += common_part + self._drawn(shape, heights, members, common=False)
         if "weld" in self.stated:
             for i, at_grid in self.peaks_at_grid.items():
-                peaks = self._weigh_residuals @ self._covariances.peaks[i]
+                peaks = self._residuals_by_precision @ self._covariances.peaks[i]
                 outlines += self.amplitudes.variances_m2[i] * (at_grid @ peaks)[:, None]
         return outlines
 
@@ -152,7 +152,7 @@ class WallField:
         ]
         if not parts:
             return 0.0
-        pull = sum(parts) * self._weigh_residuals[members]
+        pull = sum(parts) * self._residuals_by_precision[members]
         if shape == "mean":
             return pull.sum(axis=1, keepdims=True)
         return pull @ self._covariances.columns_at_sites(self._grid_covariances[shape], members).T
@@ -283,7 +283,7 @@ class WallField:
         return beta, scipy.linalg.cho_solve(factor, residuals, check_finite=False)
 
     @property
-    def _weigh_residuals(self):
+    def _residuals_by_precision(self):
         """V^-1 (y - X beta), shape (n,)."""
         return self._solution[1]
 
@@ -399,7 +399,7 @@ class Functionals:
             peaks = self._peak_derivatives(index)
             return field.amplitudes.variances_m2[index] * peaks @ peaks.T
         count = len(field._members)
-        integrals = self._correlate_functionals[component.shape]
+        integrals = self._correlations_of_functionals[component.shape]
         courses = np.repeat(np.arange(count), LEVELS)
         levels = field.sites.heights_at(courses, np.tile(gauss_heights(), count))
         height = component.height_covariance(levels, levels)
@@ -408,7 +408,7 @@ class Functionals:
         return field.amplitudes.variances_m2[index] * integrals * height
 
     @cached_property
-    def _correlate_functionals(self):
+    def _correlations_of_functionals(self):
         """{shape: covariance (f, f) of the functionals for h = 1}."""
         field, gradients = self._field, self._gradients.reshape(self._totals.size, -1)
         kernels = azimuth_correlations(field.grid_rad, np.zeros(1), field.nominal_m)
