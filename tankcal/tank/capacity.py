@@ -103,17 +103,17 @@ class Capacity:
     @cached_property
     def u_m3(self):
         """Standard uncertainty (rows,) of each volume."""
-        return self._rows.u
+        return self._combined_rows.u
 
     @cached_property
     def dof(self):
         """Effective degrees of freedom (rows,); inf if only such inputs contribute."""
-        return self._rows.effective_dof
+        return self._combined_rows.effective_dof
 
     @cached_property
     def k(self):
         """Coverage factor (rows,)."""
-        return self._rows.k(self.probability)
+        return self._combined_rows.k(self.probability)
 
     @cached_property
     def U_m3(self):
@@ -121,7 +121,7 @@ class Capacity:
         return self.k * self.u_m3
 
     @cached_property
-    def _rows(self):
+    def _combined_rows(self):
         """`uncertainty.Combined` of all rows."""
         return combine(self.sources, len(self.height_m))
 
