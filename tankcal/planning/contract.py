@@ -14,7 +14,7 @@ PLAN_FILE = "plan.toml"
 class Count(Field):
     """Field of a whole number."""
 
-    def _describe_number(self):
+    def _expected_number(self):
         return message("a_whole_number", "a whole number{bounds}", bounds=self._bounds())
 
 

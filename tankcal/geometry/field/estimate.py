@@ -138,7 +138,7 @@ class WallField:
                 outlines[course] += common_part + self._drawn(shape, heights, members, common=False)
         if "weld" in self.stated:
             for i, at_grid in self.peaks_at_grid.items():
-                peaks = self._residuals_by_precision @ self._covariances.peaks[i]
+                peaks = self._weighted_residuals @ self._covariances.peaks[i]
                 outlines += self.amplitudes.variances_m2[i] * (at_grid @ peaks)[:, None]
         return outlines
 
@@ -152,7 +152,7 @@ class WallField:
         ]
         if not parts:
             return 0.0
-        pull = sum(parts) * self._residuals_by_precision[members]
+        pull = sum(parts) * self._weighted_residuals[members]
         if shape == "mean":
             return pull.sum(axis=1, keepdims=True)
         return pull @ self._covariances.columns_at_sites(self._grid_covariances[shape], members).T
@@ -283,7 +283,7 @@ class WallField:
         return beta, scipy.linalg.cho_solve(factor, residuals, check_finite=False)
 
     @property
-    def _residuals_by_precision(self):
+    def _weighted_residuals(self):
         """V^-1 (y - X beta), shape (n,)."""
         return self._solution[1]
 
@@ -324,7 +324,7 @@ class Functionals:
         self._totals = gradients.sum(axis=2)
         factor, by_columns, normal = field._factors
         self._along = {
-            shape: self._integrate_along_sites(to_grid)
+            shape: self._along_sites(to_grid)
             for shape, to_grid in field._grid_covariances.items()
             if shape != "mean"
         }
@@ -345,7 +345,7 @@ class Functionals:
         # A = (K_g + (X_g - K_g V^-1 X) (X' V^-1 X)^-1 X') V^-1.
         self.weights = scipy.linalg.cho_solve(factor, covariance.T, check_finite=False).T
 
-    def _integrate_along_sites(self, to_grid):
+    def _along_sites(self, to_grid):
         """Return integrals (courses, LEVELS, n) of gradients times a covariance (g, azimuths)."""
         flat = self._gradients.reshape(-1, len(to_grid)) @ to_grid  # a single matrix product
         flat = self._field._covariances.columns_at_sites(flat)
@@ -399,7 +399,7 @@ class Functionals:
             peaks = self._peak_derivatives(index)
             return field.amplitudes.variances_m2[index] * peaks @ peaks.T
         count = len(field._members)
-        integrals = self._correlations_of_functionals[component.shape]
+        integrals = self._along_each_other[component.shape]
         courses = np.repeat(np.arange(count), LEVELS)
         levels = field.sites.heights_at(courses, np.tile(gauss_heights(), count))
         height = component.height_covariance(levels, levels)
@@ -408,7 +408,7 @@ class Functionals:
         return field.amplitudes.variances_m2[index] * integrals * height
 
     @cached_property
-    def _correlations_of_functionals(self):
+    def _along_each_other(self):
         """{shape: covariance (f, f) of the functionals for h = 1}."""
         field, gradients = self._field, self._gradients.reshape(self._totals.size, -1)
         kernels = azimuth_correlations(field.grid_rad, np.zeros(1), field.nominal_m)
