@@ -9,7 +9,7 @@ from matplotlib.patches import Rectangle
 
 from tankcal.pipeline.plots.style import GREY, INK, PALE, RED, WIDTH, styled
 
-_HEIGHT, _TOP = 2.0, 1.55  # of the page, and of the drawn roof
+_HEIGHT, _TOP = 1.7, 1.25  # of the page, and of the drawn roof
 _LEFT, _RIGHT, _PIPE = 0.5, 2.6, 1.7  # walls of the tank, middle of the still pipe
 _STEP = 0.24  # between two drawn zeros
 _TEXT = 3.05  # left edge of the labels
@@ -27,7 +27,7 @@ def sketch(paper):
     ax.axis("off")
     ax.plot([_LEFT, _LEFT, _RIGHT, _RIGHT], [_TOP, 0.2, 0.2, _TOP], color=INK, linewidth=1.4)
     ax.plot([_LEFT, _RIGHT], [_TOP, _TOP], color=INK, linewidth=0.8)
-    ax.add_patch(Rectangle((_LEFT, 0.2), _RIGHT - _LEFT, 0.85, color=PALE, alpha=0.35, linewidth=0))
+    ax.add_patch(Rectangle((_LEFT, 0.2), _RIGHT - _LEFT, 0.75, color=PALE, alpha=0.35, linewidth=0))
     _draw_gauge(ax, gauge["gauge"]["supported_by"])
     known = [zero for zero in gauge["zeros"][:3] if zero["z_mm"] is not None]
     heights = _heights(known)
