@@ -237,6 +237,7 @@ DEAR = (  # a valid input takes a second of processor time or more; the command 
     "run wall-hits", "run silva-1995-photos", "run cloud", "run rings", "run strict", "report",
     "plan reference-line", "plan wall-hits", "plan tangents", "plan liquid", "plan silva",
     "read-table lying", "camera influence", "answer", "ticket document",
+    "gauge certificate", "chart",
 )  # fmt: skip
 
 
@@ -436,6 +437,24 @@ source = "meter"
 """
 TICKETS = b"ticket,opening_dip_m,closing_dip_m,closing_temperature_c\na,2.1,5.2,30\nb,1.5,,28.5\n"
 
+GAUGE = b"""
+[certificate]
+date = 2026-11-20
+
+[gauge]
+record = "record.json"
+resolution_mm = 1
+supported_by = "bottom"
+lowest_m = 0.5
+highest_m = 8.0
+
+[limit]
+source = "contract"
+absolute_mm = 4
+rule = "guarded"
+"""
+READINGS = b"level,dip_m,gauge_m\nlow,1.812,1.814\nmid,4.904,4.907\nhigh,7.731,7.735\n"
+
 
 def _make_quantities(folder):
     """Commands from the table of a record to the quantity."""
@@ -443,6 +462,7 @@ def _make_quantities(folder):
     assert cli.main(["run", str(folder), "--no-papers", "--quiet"]) == 0
     record = {"record.json": (folder / "results" / "record.json").read_bytes()}
     ticket = record | {"ticket.toml": TICKET}
+    gauge = record | {"gauge.toml": GAUGE, "readings.csv": READINGS}
     command = ("ticket", "{in}/record.json", "{in}/ticket.toml")
     return {
         "ticket": Base((*command, "--json"), ticket, ("ticket.toml",), complains=False),
@@ -452,6 +472,12 @@ def _make_quantities(folder):
             ticket | {"tickets.csv": TICKETS}, ("ticket.toml", "tickets.csv"), complains=False),
         "ticket document": Base((*command, "--quiet", "--out", "{out}"), ticket,
                                 ("ticket.toml",), complains=False),
+        "gauge": Base(("gauge", "{in}", "--json"), gauge, ("gauge.toml", "readings.csv"),
+                      complains=False),
+        "gauge certificate": Base(("gauge", "{in}", "--quiet", "--out", "{out}"), gauge,
+                                  ("gauge.toml", "readings.csv"), complains=False),
+        "chart": Base(("chart", "{in}/record.json", "--step-cm", "5", "--json", "--out",
+                       "{out}/chart.pdf"), record, complains=False),
     }  # fmt: skip
 
 
