@@ -26,6 +26,7 @@ MOST_PROBLEMS = 20  # largest number of reported problems of a file
 Finite = Annotated[float, "finite"]  # a number that is never null
 _SCALARS = {bool: "boolean", int: "integer", str: "string"}
 _JSON_CONSTANTS = {"None": "null", "True": "true", "False": "false"}
+LARGEST = 1e100  # no quantity in SI units is as large, and axes of figures overflow beyond
 _TYPES = {  # types of Python for each type of JSON
     "boolean": {bool}, "integer": {int}, "number": {int, float}, "string": {str},
     "null": {type(None)}, "array": {list}, "object": {dict},
@@ -317,7 +318,7 @@ def _find_faults(value, schema, root, path):
         yield from _find_faults_of_object(value, schema, root, path)
     elif isinstance(value, list):
         yield from _find_faults_of_array(value, schema, root, path)
-    elif type(value) in (int, float) and not _are_finite([value]):
+    elif type(value) in (int, float) and not _are_usable([value]):
         yield path, _expected_value(names, value)
 
 
@@ -365,14 +366,15 @@ def _are_valid(values, items):
     allowed = set().union(*(_TYPES[name] for name in names))
     if not kinds <= allowed - {list, dict}:
         return False
-    return not kinds & {int, float} or _are_finite(values)
+    return not kinds & {int, float} or _are_usable(values)
 
 
-def _are_finite(values):
-    """Return whether a float can represent all numbers among the values."""
+def _are_usable(values):
+    """Return whether all numbers among the values are finite and of a possible size."""
+    numbers = [value for value in values if type(value) in (int, float)]
     try:
-        return all(map(isfinite, (value for value in values if type(value) in (int, float))))
-    except OverflowError:
+        return all(map(isfinite, numbers)) and max(map(abs, numbers), default=0) < LARGEST
+    except OverflowError:  # an integer that no float can represent
         return False
 
 
@@ -386,6 +388,8 @@ def _expected_value(names, value):
     found = _JSON_CONSTANTS.get(found, found)
     found = found if len(found) <= 40 else f"{found[:37]}..."
     match next(name for name in names if name != "null"):
+        case "number" if type(value) in (int, float) and value == value:  # not NaN
+            expected = message("record_size", "a number smaller than {most:g}", most=LARGEST)
         case "number":
             expected = message("record_number", "a number")
         case "integer":
