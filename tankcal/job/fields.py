@@ -128,6 +128,8 @@ class Field:
 
     def wanted(self):
         """Meaning and accepted values in words: "height of the course (a number above 0)"."""
+        if not self.note:  # the notes of a product may be in the words of each language
+            return self.expectation()
         if self.kind in ("text", "name", "tank id"):
             return message("noted", "{note}", note=self.note)
         return message("wanted", "{note} ({expected})", note=self.note, expected=self.expectation())

@@ -47,7 +47,8 @@ class SavedDocument:
         {name of a further file: function that writes it}, as `write_workbook`, before the PDF.
     recomputed_by : str
         "module:function" that computes the content again, as (content, folder of the inputs) to
-        (number of compared values or None, list of Problem); "": not possible.
+        (number of compared values or None, list of Problem, list of Message on checks that were
+        not possible); "": not possible.
     """
 
     saved_format: SavedFormat

@@ -329,9 +329,9 @@ def _compare_covariance(verification, path, adjustment):
 def verify_saved_folder(verification, folder, callbacks, manifest, inputs):
     """Verify a folder with a saved file other than a record; return whether it is such a folder.
 
-    Comparisons, inspections, histories and tickets are written again from their saved file. A
-    ticket is also computed again from its record. For plans, camera results and any other folder
-    with SHA256SUMS, only the hashes are compared.
+    Comparisons, inspections, histories, tickets and gauges are written again from their saved file.
+    Tickets and gauges are also computed again from their inputs. For plans, camera results and any
+    other folder with SHA256SUMS, only the hashes are compared.
 
     Parameters
     ----------
@@ -385,22 +385,13 @@ def _compute_document_again(verification, document, content, inputs):
     """Compute a saved file again from its record; report differences and changed input files."""
     compare_inputs(verification, content, inputs)
     try:
-        count, problems = document.compute_again(content, inputs)
+        count, problems, notes = document.compute_again(content, inputs)
     except InputError as error:
         verification.problems += error.problems
         return
     verification.problems += problems
-    if count is None:
-        verification.note(
-            message(
-                "verify_record_not_found",
-                "the record of {file} is not in the folder of the inputs ({folder}): its "
-                "numbers were not computed again",
-                file=verification.saved_file,
-                folder=str(inputs),
-            )
-        )
-    elif not problems:
+    verification.notes += notes
+    if count is not None and not problems:
         verification.made_again.add(verification.saved_file)
         verification.note(
             message("verify_values_again", "computed again: {count} values, all equal", count=count)

@@ -4,6 +4,7 @@ import csv
 import json
 import shutil
 import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -27,9 +28,10 @@ from tankcal.products.gauge.reading import UNCERTAINTIES, read_comparison
 from tankcal.products.gauge.starter import write_starter
 from tankcal.record.schema import to_plain
 from tankcal.report.verification import verify
-from tankcal.text.shipped import LANGUAGES
+from tankcal.text.shipped import LANGUAGES, shipped_folder
 from tankcal.text.words import load_words
 
+GAUGE_EXAMPLE = shipped_folder("examples") / "gauge"
 SETTINGS = {
     "certificate": {"number": "7", "date": "2026-11-20", "by": "A. Silva", "place": "Terminal"},
     "gauge": {
@@ -549,6 +551,119 @@ def test_hostile_texts_are_only_texts(tmp_path):
     hostile = {"number": "=1+1", "by": "#let x = 1", "place": "<b>" + "x" * 200, "note": "*a_"}
     folder = write(tmp_path / "g", certificate=hostile)
     assert main(["gauge", str(folder), "--out", str(tmp_path / "out"), "--quiet"]) == 0
+
+
+# ---- computed again by `tankcal verify`
+
+
+def change_all(out, change):
+    """Change gauge.json, and make every other file and SHA256SUMS fit."""
+    gauge = json.loads((out / "gauge.json").read_text(encoding="utf-8"))
+    change(gauge)
+    shutil.rmtree(out)
+    DOCUMENT.write(gauge, out)
+
+
+def enlarge_limit(gauge):
+    gauge["inputs"]["limit"]["absolute_mm"] = gauge["decision"]["absolute_mm"] = 9
+    for level in gauge["levels"]:
+        level["limit_mm"] = 9
+
+
+CHANGES = {
+    "deviation": lambda gauge: gauge["levels"][1].update(deviation_mm=0.1),
+    "U": lambda gauge: [row.update(U_mm=row["U_mm"] / 2) for row in gauge["corrections"]],
+    "verdict": lambda gauge: gauge["decision"].update(verdict="failed"),
+    "dip": lambda gauge: gauge["readings"][0].update(dip_m=1.250),
+    "indication": lambda gauge: gauge["readings"][0].update(gauge_m=1.2510),
+    "u": lambda gauge: gauge["inputs"]["uncertainty"].update(u_tape_ppm=10),
+    "limit": lambda gauge: gauge["inputs"]["limit"].update(absolute_mm=9),
+    "all limits": enlarge_limit,
+    "tank": lambda gauge: gauge.update(tank="S-2"),
+    "assumption": lambda gauge: gauge["uncertainties"][0].update(is_assumed=False),
+    "reading removed": lambda gauge: gauge["readings"].pop(),
+    "warning": lambda gauge: gauge["warnings"].append(
+        {"file": "x", "row": None, "column": None, "text": "x", "code": None, "values": {}}
+    ),
+    "notice": lambda gauge: gauge.update(notice=""),
+}
+
+
+@pytest.mark.parametrize("what", CHANGES)
+def test_a_changed_value_is_detected_although_all_hashes_agree(tmp_path, what):
+    out = tmp_path / "out"
+    assert main(["gauge", str(GAUGE_EXAMPLE), "--out", str(out), "--quiet"]) == 0
+    change_all(out, CHANGES[what])
+    for inputs in (GAUGE_EXAMPLE, tmp_path):
+        result = verify(out, inputs)
+        assert {problem.expected.code for problem in result.problems} == {"verify_value_apart"}
+
+
+def test_readings_changed_with_all_their_results_are_detected_by_the_input_files(tmp_path):
+    """A forged comparison agrees with itself; only readings.csv contradicts it."""
+    out, forged = tmp_path / "out", tmp_path / "forged"
+    shutil.copytree(GAUGE_EXAMPLE, forged)
+    path = forged / "readings.csv"
+    path.write_text(path.read_text().replace("A,1.249,", "A,1.248,", 1), encoding="utf-8")
+    digest = computed(GAUGE_EXAMPLE)["files"]
+    assert main(["gauge", str(forged), "--out", str(out), "--quiet"]) == 0
+    change_all(out, lambda gauge: gauge.update(files=digest))
+    alone, beside = verify(out), verify(out, GAUGE_EXAMPLE)
+    assert alone.problems == []
+    assert [note.code for note in alone.notes] == ["verify_gauge_inputs", "verify_values_again"]
+    (problem,) = beside.problems
+    assert problem.expected.values["place"] == "readings[0].dip_m"
+    # Changed input files are reported by their hash.
+    codes = {problem.expected.code for problem in verify(out, forged).problems}
+    assert codes == {"verify_input_changed"}
+
+
+def test_values_of_the_record_are_detected_by_the_record(tmp_path, record_folder):
+    """A forged radius or reference height agrees with gauge.json; the record contradicts it."""
+    gauge = {"record": str(record_folder / "r"), "supported_by": "shell", "highest_m": 9}
+    settings = {"gauge": gauge, "liquid": {"density_kg_m3": 850}, "reference": {"height_m": 9.81}}
+    folder = write(tmp_path / "g", **settings)
+    text = (folder / "gauge.toml").read_text().replace('tank = "TK-14"\n', "")
+    (folder / "gauge.toml").write_text(text, encoding="utf-8")
+    out = tmp_path / "out"
+    assert main(["gauge", str(folder), "--out", str(out), "--quiet"]) == 0
+    saved = json.loads((out / "gauge.json").read_text(encoding="utf-8"))
+    assert saved["notice"] == "RECONSTRUCTION"
+    assert saved["record"]["reference_height_m"] == saved["table_reference_height_m"]
+    result = verify(out, folder)
+    assert (result.problems, [note.code for note in result.notes]) == ([], ["verify_values_again"])
+    change_all(out, lambda gauge: gauge["record"]["courses"][0].update(radius_m=6.6))
+    places = [problem.expected.values["place"] for problem in verify(out, folder).problems]
+    assert "record.courses[0].radius_m" in places
+    text = text.replace(str(record_folder / "r"), "elsewhere")
+    (folder / "gauge.toml").write_text(text, encoding="utf-8")
+    codes = [note.code for note in verify(out, tmp_path).notes]
+    assert codes[:1] == ["verify_gauge_inputs"]
+
+
+# ---- the example
+
+
+def test_example_gives_the_truth(tmp_path):
+    """Each correction of examples/gauge leads to the true level within U."""
+    truth = json.loads((GAUGE_EXAMPLE / "truth.json").read_text(encoding="utf-8"))
+    gauge = computed(GAUGE_EXAMPLE)
+    rows = {row["gauge_m"]: row for row in gauge["corrections"]}
+    for level, deviation_mm in truth["deviation_mm"].items():
+        row = rows[float(level)]
+        assert abs(row["correction_mm"] + deviation_mm) <= row["U_mm"]
+    line = gauge["line"]
+    assert line["U_tilt_low_deg"] <= truth["tilt_deg"] <= line["U_tilt_high_deg"]
+    assert gauge["decision"]["verdict"] == "passed"
+
+
+def test_example_is_written_again_by_its_simulation(tmp_path):
+    shutil.copytree(GAUGE_EXAMPLE, tmp_path / "g")
+    for name in ("readings.csv", "truth.json"):
+        (tmp_path / "g" / name).unlink()
+    subprocess.run([sys.executable, "simulate.py"], cwd=tmp_path / "g", check=True)
+    for name in ("readings.csv", "truth.json"):
+        assert (tmp_path / "g" / name).read_bytes() == (GAUGE_EXAMPLE / name).read_bytes()
 
 
 @pytest.mark.parametrize("language", LANGUAGES)

@@ -232,7 +232,7 @@ def test_a_changed_ticket_is_detected_although_all_files_agree(tank, tmp_path, c
     folder = _copy(tank, tmp_path)
     _write_again(folder / "out", change)
     result = verify(folder / "out")
-    assert {problem.expected.code for problem in result.problems} == {"verify_ticket_apart"}
+    assert {problem.expected.code for problem in result.problems} == {"verify_value_apart"}
 
 
 def test_changed_files_are_detected(tank, tmp_path):

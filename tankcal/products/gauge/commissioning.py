@@ -53,8 +53,9 @@ def commission(comparison):
     k_normal = float(coverage_factor(comparison.probability, np.inf))
     tape = declared["tape"]
     return saved.GaugeFile(
+        notice=declared["certificate"]["notice"] or (comparison.tank.notice if comparison.tank
+                                                     else ""),
         tank=declared["gauge"]["tank"] or comparison.tank.tank,
-        record_sha256=None if comparison.tank is None else comparison.tank.digest,
         coverage_probability=comparison.probability,
         certificate=saved.GaugeCertificate(
             **{name: declared["certificate"][name] for name in
@@ -90,9 +91,38 @@ def commission(comparison):
             for name, value in comparison.u.items()
         ],
         decision=_decision(declared["limit"], levels),
-        inputs=[saved.GaugeSource(*file) for file in comparison.inputs],
+        record=record_of(comparison.tank),
+        inputs=inputs_of(comparison.sections),
+        readings=readings_of(comparison.table),
+        files=[saved.GaugeSource(*file) for file in comparison.files],
         warnings=warnings_of([*comparison.warnings, *_warnings(comparison, line, zeros)]),
     )  # fmt: skip
+
+
+def record_of(tank):
+    """`saved.GaugeRecord` of `reading.TankFacts`; None: no record."""
+    if tank is None:
+        return None
+    courses = [saved.GaugeCourse(*course) for course in tank.courses]
+    return saved.GaugeRecord(tank.digest, tank.tank, tank.reference_height_m, tank.zero_m, courses,
+                             tank.e_pa, tank.notice)  # fmt: skip
+
+
+def inputs_of(sections):
+    """Sections of gauge.toml without blank keys."""
+    filled = {
+        section: {key: value for key, value in values.items() if value is not None}
+        for section, values in sections.items()
+    }
+    return {section: values for section, values in filled.items() if values}
+
+
+def readings_of(table):
+    """`saved.GaugeReading` of each row of readings.csv."""
+    return [
+        saved.GaugeReading(row, **record)
+        for row, record in zip(table.rows, table.records(), strict=True)
+    ]
 
 
 def _or(value, default):

@@ -14,7 +14,7 @@ from tankcal.text.digits import format_with_u, shortest
 from tankcal.text.shipped import DEFAULT
 from tankcal.text.words import load_words
 
-FILE, WORKBOOK = "gauge.json", "gauge.xlsx"
+FILE, WORKBOOK, RECORD = "gauge.json", "gauge.xlsx", "record.json"
 DIGEST = 12  # printed digits of a SHA-256
 _SPACE = "\N{NO-BREAK SPACE}"
 
@@ -246,7 +246,10 @@ def _remarks(paper):
     if assumed:
         texts.append(paper.word("texts.assumed", inputs="; ".join(assumed)))
     texts += paper.words["standing"].values()
-    files = ", ".join(f"{item['file']} {item['sha256'][:DIGEST]}" for item in gauge["inputs"])
+    sources = [*gauge["files"]]
+    if gauge["record"] is not None:
+        sources.append({"file": RECORD, "sha256": gauge["record"]["sha256"]})
+    files = ", ".join(f"{item['file']} {item['sha256'][:DIGEST]}" for item in sources)
     texts.append(paper.word("texts.inputs", files=bearable(files)))
     return [paper.heading("remarks"), blocks.listing(texts)]
 
@@ -321,4 +324,5 @@ DOCUMENT = SavedDocument(
     ),
     tables=FILES,
     has_page=False,
+    recomputed_by="tankcal.products.gauge.recomputation:compute_again",
 )

@@ -12,13 +12,14 @@ from tankcal.exports.exporting import shortening_m
 from tankcal.job.checking import missing_beside
 from tankcal.job.contract.keys import CSV
 from tankcal.job.contract.shorthand import choice, number, positive
-from tankcal.job.entries import read_columns
+from tankcal.job.entries import ColumnValues, read_columns
 from tankcal.job.fields import Field
 from tankcal.job.folder import read_csv
-from tankcal.job.tables import Log, fingerprint, read_bytes
+from tankcal.job.tables import Log, make_table, read_bytes
 from tankcal.messages import message
 from tankcal.products.gauge.deviation import LEAST_LEVELS, Dips, KnownSlope, slope_of_tilt
 from tankcal.products.settings import read_sections
+from tankcal.record.manifest import digest_of
 from tankcal.tank import gauging
 from tankcal.text.shipped import LANGUAGES
 
@@ -55,7 +56,7 @@ def _text(name):
 # Keys and columns; their notes are in [gauge.notes] of the words of each language.
 SECTIONS = {
     "certificate": (
-        *(_text(name) for name in ("number", "by", "place", "customer", "note")),
+        *(_text(name) for name in ("number", "by", "place", "customer", "note", "notice")),
         Field("date", "date", "", required=True),
         choice("language", "", LANGUAGES),
         number("coverage_probability", "", 0.5, 0.9999),
@@ -117,6 +118,8 @@ class TankFacts:
         Courses from the bottom up; (): none.
     e_pa : float
         Young's modulus of the shell.
+    notice : str
+        Notice on every page of its certificate, such as EXAMPLE; "": none.
     """
 
     tank: str
@@ -125,6 +128,7 @@ class TankFacts:
     zero_m: float
     courses: tuple
     e_pa: float
+    notice: str
 
 
 @dataclass(frozen=True)
@@ -135,6 +139,8 @@ class Comparison:
     ----------
     sections : dict
         {section: {key: value}} of gauge.toml.
+    table : job.entries.ColumnValues
+        Readings as in readings.csv.
     u : dict
         {name: standard uncertainty}, declared or assumed.
     tank : TankFacts or None
@@ -147,12 +153,13 @@ class Comparison:
         Slope in place of an estimate; None: it is estimated.
     movement : callable or None
         movement(level_m) returns the movement h of the gauge; None: no movement is modelled.
-    inputs : tuple of (str, str)
-        Name and SHA-256 of each file.
+    files : tuple of (str, str)
+        Name and SHA-256 of gauge.toml and readings.csv.
     warnings : tuple of Problem
     """
 
     sections: dict
+    table: ColumnValues
     u: dict
     tank: TankFacts | None
     names: tuple
@@ -160,7 +167,7 @@ class Comparison:
     dips: Dips
     known_slope: KnownSlope | None
     movement: object
-    inputs: tuple
+    files: tuple
     warnings: tuple
 
     @property
@@ -188,16 +195,84 @@ def read_comparison(folder):
     """
     folder, log = Path(folder).absolute(), Log()
     settings = folder if folder.suffix == ".toml" else folder / SETTINGS
-    folder = settings.parent
+    readings = settings.with_name(READINGS)
+    source, table = _read_files(settings, readings, log)
+    tank = _tank(source, settings.parent)
+    files = tuple((path.name, digest_of(path)) for path in (settings, readings))
+    return _compare(source, table, tank, files)
+
+
+def read_files(settings, readings):
+    """Read gauge.toml and readings.csv without checks of the comparison.
+
+    Returns
+    -------
+    sections : dict
+        {section: {key: value or None}}.
+    table : job.entries.ColumnValues
+
+    Raises
+    ------
+    InputError
+        With every problem of the files.
+    """
+    source, table = _read_files(Path(settings), Path(readings), Log())
+    return source.sections, table
+
+
+def _read_files(settings, readings, log):
+    """(`_Source`, `ColumnValues`) of both files."""
     sections, places, marks = read_sections(settings, SECTIONS, log)
-    data = None if marks is None else read_bytes(folder / READINGS, log)
-    raw = None if data is None else read_csv(READINGS, data, *marks, log, SETTINGS)
+    data = None if marks is None else read_bytes(readings, log)
+    raw = None if data is None else read_csv(READINGS, data, *marks, log, settings.name)
     table = None if raw is None else read_columns(None, raw, log, COLUMNS)
     log.stop_if_problems()
-    source = _Source(settings.name, sections, places, log)
-    tank = _tank(source, folder)
+    return _Source(settings.name, sections, places, log), table
+
+
+def read_saved_comparison(inputs, readings, tank, files):
+    """Check a commissioning again from its saved inputs.
+
+    Parameters
+    ----------
+    inputs : dict
+        {section: {key: value}} of gauge.toml, without blank keys.
+    readings : list of dict
+        {column: value} of each row of readings.csv, with its number "row".
+    tank : TankFacts or None
+    files : tuple of (str, str)
+        Name and SHA-256 of gauge.toml and readings.csv.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    InputError
+        With every problem of the inputs.
+    """
+    log, name = Log(), files[0][0] if files else SETTINGS
+    sections, places, _ = read_sections(inputs, SECTIONS, log, name)
+    headings = [field.name for field in COLUMNS]
+    rows = [(reading["row"], [_cell(reading[key]) for key in headings]) for reading in readings]
+    raw = make_table(READINGS, [(1, headings), *rows], ".", log)
+    table = read_columns(None, raw, log, COLUMNS)
+    log.stop_if_problems()
+    return _compare(_Source(name, sections, places, log), table, tank, files)
+
+
+def _cell(value):
+    """Text of a saved value in a cell; repr keeps every digit of a number."""
+    return "" if value is None else value if isinstance(value, str) else repr(value)
+
+
+def _compare(source, table, tank, files):
+    """`Comparison` of settings, readings and facts of the tank, with all checks."""
+    sections, log = source.sections, source.log
+    log.stop_if_problems()
     _check_settings(source, tank)
-    dips_of, by_ullage = _check_readings(source, table, log)
+    lengths, by_ullage = _check_readings(source, table, log)
     log.stop_if_problems()
     u = {
         name: assumed if sections["uncertainty"][name] is None else sections["uncertainty"][name]
@@ -209,15 +284,11 @@ def read_comparison(folder):
     ):
         u["u_tape_temperature_k"] = BLANK_TAPE_K
     movement = _movement(source, tank, by_ullage)
-    names, counts, dips = _mean_readings(source, table, dips_of, by_ullage, u, movement)
+    names, counts, dips = _mean_readings(source, table, lengths, by_ullage, u, movement)
     known_slope = _find_slope(source, names)
     log.stop_if_problems()
-    files = ((settings.name, settings.read_bytes()), (READINGS, data))
-    inputs = [fingerprint(*file)[:2] for file in files]
-    if tank is not None:
-        inputs.append((Path(sections["gauge"]["record"]).name, tank.digest))
-    return Comparison(sections, u, tank, names, counts, dips, known_slope, movement,
-                      tuple(inputs), tuple(log.warnings))  # fmt: skip
+    return Comparison(sections, table, u, tank, names, counts, dips, known_slope, movement,
+                      files, tuple(log.warnings))  # fmt: skip
 
 
 class _Source:
@@ -243,27 +314,40 @@ def _tank(source, folder):
         return None
     path = folder / name
     path = path / "record.json" if path.is_dir() else path
-    content = read_bytes(path, source.log)
-    if content is None:
+    if read_bytes(path, source.log) is None:
         return None
     try:
-        record = records.read(path, tables=False)
+        tank = read_tank(path)
     except InputError as error:
         source.log.problems.extend(error.problems)
         return None
-    if record.capacity is None:
+    if tank is None:
         source.tell("gauge.record", message("gauge_no_table", "the record of a survey without a "
                     "tank; expected a record with a capacity table"))  # fmt: skip
+    return tank
+
+
+def read_tank(path):
+    """Read the `TankFacts` of a record.json; None for a record without a capacity table.
+
+    Raises
+    ------
+    InputError
+        If the file is no record.
+    """
+    record = records.read(path, tables=False)
+    if record.capacity is None:
         return None
     courses = [(c.height_m, c.thickness_m, c.inside_radius_m) for c in record.courses]
     is_known = bool(courses) and min(thickness for _, thickness, _ in courses) > 0
     return TankFacts(
         record.job.tank.id,
-        fingerprint(path.name, content)[1],
+        digest_of(path),
         record.job.datum.reference_height_m,
         record.capacity.zero_m,
         tuple(courses) if is_known else (),
         record.job.material.e_pa,
+        str(record.job.certificate.get("notice") or ""),
     )
 
 

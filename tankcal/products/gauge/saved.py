@@ -165,6 +165,37 @@ class GaugeSource(Saved):
     sha256: str = key("of its bytes")
 
 
+class GaugeCourse(Saved):
+    """A course of the tank, from its record."""
+
+    height_m: Finite = key("of the course")
+    thickness_m: Finite = key("of the plate")
+    radius_m: Finite = key("inside radius")
+
+
+class GaugeRecord(Saved):
+    """Facts of the tank from its record."""
+
+    sha256: str = key("of record.json")
+    tank: str = key("name of the tank")
+    reference_height_m: float | None = key("above the zero of the table; null: not known")
+    zero_m: Finite = key("height of the zero of the table above the bottom")
+    courses: list[GaugeCourse] = key("from the bottom up; none: plates not known")
+    e_pa: Finite = key("Young's modulus of the shell")
+    notice: str = key('on every page of its certificate; "": none')
+
+
+class GaugeReading(Saved):
+    """A row of readings.csv."""
+
+    row: int = key("in the file")
+    level: str = key("name of the level")
+    dip_m: float | None = key("tape reading at the liquid, before corrections")
+    ullage_m: float | None = key("tape reading from the reference point, before corrections")
+    gauge_m: Finite = key("indication of the gauge")
+    tape_c: float | None = key("temperature of the tape; null: not measured")
+
+
 class GaugeFile(Saved, kw_only=True):
     """Comparison of a level gauge with hand dips."""
 
@@ -172,7 +203,6 @@ class GaugeFile(Saved, kw_only=True):
     tankcal: str = key("version of tankcal", default_factory=find_version)
     notice: str = key("on every page, such as EXAMPLE", default="")
     tank: str = key("name of the tank")
-    record_sha256: str | None = key("of the record of the tank; null: none")
     coverage_probability: Finite = key("of all U")
     certificate: GaugeCertificate = key("facts of the certificate")
     gauge: GaugeInstrument = key("the gauge")
@@ -189,5 +219,8 @@ class GaugeFile(Saved, kw_only=True):
     budget: list[GaugeContribution] = key("of the deviation")
     uncertainties: list[GaugeInput] = key("declared and assumed standard uncertainties")
     decision: GaugeDecision | None = key("null: no limit is declared")
-    inputs: list[GaugeSource] = key("files of the comparison")
+    record: GaugeRecord | None = key("facts of the tank; null: no record")
+    inputs: dict = key("gauge.toml as {section: {key: value}}, without blank keys")
+    readings: list[GaugeReading] = key("rows of readings.csv")
+    files: list[GaugeSource] = key("gauge.toml and readings.csv")
     warnings: list[WarningRecord] = key("on the comparison")

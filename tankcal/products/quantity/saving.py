@@ -1,7 +1,6 @@
 """The saved form of a ticket, and its computation from the saved form."""
 
 from dataclasses import fields
-from pathlib import Path
 
 import numpy as np
 
@@ -13,10 +12,11 @@ from tankcal.products.quantity.results import compare
 from tankcal.products.quantity.slips import find_slips
 from tankcal.products.quantity.table import read_table
 from tankcal.products.quantity.transfer import STATES
-from tankcal.record.manifest import digest_of
+from tankcal.products.recomputing import compare_values, find_record
 from tankcal.record.schema import to_plain
 from tankcal.record.texts import warnings_of
 from tankcal.record.ticket import (
+    TICKET,
     ComparisonOfTicket,
     ContributionToTicket,
     FactorsOfTicket,
@@ -37,9 +37,6 @@ UNITS = {  # of the steps; others have no unit
     **dict.fromkeys(("mass_kg", "weight_kg"), "kg"),
     "shell_c": "degC",
 }
-RECORD = "record.json"
-MOST_FOLDERS = 200  # of the folder of the inputs that are searched for the record
-TOLERANCE = 1e-9  # largest relative difference between two computations
 
 
 def ticket_file(tickets):
@@ -269,79 +266,29 @@ def compute_again(saved, folder):
         Number of the compared values; None: the record was not found.
     problems : list of Problem
         Differences.
+    notes : list of Message
+        Checks that were not possible.
 
     Raises
     ------
     InputError
         If the inputs are not those of a ticket.
     """
-    problems = []
-    path = _find_record(folder, saved["table"]["sha256"])
+    path = find_record(folder, saved["table"]["sha256"])
     if path is None:
-        return None, problems
+        text = message(
+            "verify_record_not_found",
+            "the record of {file} is not in the folder of the inputs ({folder}): its numbers were "
+            "not computed again",
+            file=TICKET.file, folder=str(folder),
+        )  # fmt: skip
+        return None, [], [text]
     factors = saved["factors"]
     if factors is not None:
         grid = (np.array(factors[key]) for key in ("density_kg_m3", "temperature_c", "factor"))
         factors = FactorTable(factors["file"], *grid, saved["inputs"]["product"].get("base"))
     tickets = read_tickets(read_table(path), saved["inputs"], factors=factors)
     again = to_plain(ticket_file(tickets))
-    ignored = {"format", "tankcal", "files", "warnings", "inputs"}
-    pairs = [
-        pair
-        for name in again
-        if name not in ignored
-        for pair in _leaves(name, saved.get(name), again[name])
-    ]
-    for place, recorded, computed in pairs:
-        if not _agree(recorded, computed):
-            expected = message(
-                "verify_ticket_apart",
-                "{place} is {recorded}, computed again {computed}; expected equal values",
-                place=place, recorded=_value_text(recorded), computed=_value_text(computed),
-            )  # fmt: skip
-            problems.append(Problem("ticket.json", expected))
-    return len(pairs), problems
-
-
-def _value_text(value):
-    return f"{value:.10g}" if isinstance(value, float) else repr(value)[:80]
-
-
-def _find_record(folder, digest):
-    """The record.json with a SHA-256 in a folder or its subfolders; None if there is none."""
-    folder = Path(folder)
-    if folder.is_file():
-        folder = folder.parent
-    try:
-        subfolders = sorted(path for path in folder.iterdir() if path.is_dir())[:MOST_FOLDERS]
-    except OSError as error:
-        raise InputError(Problem(str(folder), str(error))) from error
-    for place in (folder, *subfolders, *(path / "results" for path in subfolders)):
-        path = place / RECORD
-        if path.is_file() and digest_of(path) == digest:
-            return path
-    return None
-
-
-def _leaves(place, recorded, computed):
-    """Yield (place, recorded, computed) of all values of two nested data."""
-    if isinstance(computed, dict) and isinstance(recorded, dict):
-        for name in {**recorded, **computed}:
-            yield from _leaves(f"{place}.{name}", recorded.get(name), computed.get(name))
-    elif isinstance(computed, list) and isinstance(recorded, list):
-        if len(computed) != len(recorded):
-            yield f"{place}[]", len(recorded), len(computed)
-        for row, pair in enumerate(zip(recorded, computed, strict=False)):
-            yield from _leaves(f"{place}[{row}]", *pair)
-    else:
-        yield place, recorded, computed
-
-
-def _agree(recorded, computed):
-    numbers = (int, float)
-    if isinstance(recorded, bool) or isinstance(computed, bool):
-        return recorded is computed
-    if isinstance(recorded, numbers) and isinstance(computed, numbers):
-        # Small contributions are differences of large numbers, so 1e-9 alone is too strict.
-        return abs(recorded - computed) <= TOLERANCE * max(abs(computed), 1e-3)
-    return recorded == computed
+    for name in ("format", "tankcal", "files", "warnings", "inputs"):
+        del again[name]
+    return *compare_values(TICKET.file, saved, again), []
