@@ -24,6 +24,7 @@ from tankcal.job.model import (
     InputFile,
     Inspection,
     Job,
+    Levels,
     Material,
     Mesh,
     Roof,
@@ -213,15 +214,16 @@ def make_job(raw, values, tables, attached, measurements, warnings):
         circumference_m=values["checks"]["circumference_m"],
         diameter_is=values["checks"]["diameter_is"],
         diameter_within_m=None if within_mm is None else within_mm / 1000,
-        inspection=_inspection(values["inspection"]),
+        inspection=_optional(Inspection, values["inspection"]),
+        levels=_optional(Levels, values["levels"]),
         mesh=_mesh(values["mesh"], attached.mesh[1]) if kind == "mesh" else None,
         ship=_ship(values["ship"]) if kind == "mesh" and is_ship(values) else None,
     )
 
 
-def _inspection(given):
-    """`Inspection` of the section [inspection]; None if rule and yield stress are blank."""
-    return structure(Inspection, given) if _given(given) else None
+def _optional(kind, given):
+    """Object of a section; None if all its keys are blank."""
+    return structure(kind, given) if _given(given) else None
 
 
 def make_frame(raw, values, tables, measurements, warnings, has_points=True):

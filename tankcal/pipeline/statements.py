@@ -27,11 +27,14 @@ class Statements:
         Budgets of dips and of pairs of dips, requested in the job or by default.
     worst : tuple of WorstDeliveries
         For each minimum height, in ascending order.
+    limits : tuple of TankLimit
+        From the levels of the job; their budgets are among the volumes and deliveries.
     """
 
     volumes: tuple[Budget, ...]
     deliveries: tuple[Budget, ...]
     worst: tuple[WorstDeliveries, ...]
+    limits: tuple["TankLimit", ...] = ()
 
     @property
     def pairs(self):
@@ -39,6 +42,62 @@ class Statements:
         return tuple(
             (stated_delivery.low_m, stated_delivery.high_m) for stated_delivery in self.deliveries
         )
+
+
+@dataclass(frozen=True)
+class TankLimit:
+    """Volume below an operating level (low_m: None) or between two.
+
+    Attributes
+    ----------
+    code : str
+        Below a dip: "full", "maximum", "minimum", "pump_suction", "below_table".
+        Between two dips: "working_capacity", "pumpable", "reserve".
+    low_m, high_m : float
+        Dips, m.
+    """
+
+    code: str
+    low_m: float | None
+    high_m: float
+
+
+def tank_limits(levels, table):
+    """Return the `TankLimit`s that follow from the levels of a job.
+
+    Parameters
+    ----------
+    levels : Levels or None
+    table : Capacity
+
+    Returns
+    -------
+    tuple of TankLimit
+        The levels from the top down, then the volumes between them.
+    """
+    if levels is None:
+        return ()
+    dips = {
+        "full": levels.full_m,
+        "maximum": levels.maximum_m,
+        "minimum": levels.minimum_m,
+        "pump_suction": levels.pump_suction_m,
+        # No liquid is below the lowest row of a tank whose dip plate is its lowest point.
+        "below_table": float(table.height_m[0]) if table.volume_m3[0] > 0 else None,
+    }
+    between = (
+        ("working_capacity", "minimum", "maximum"),
+        ("pumpable", "pump_suction", "maximum"),
+        ("reserve", "maximum", "full"),
+    )
+    volumes = [TankLimit(code, None, dip) for code, dip in dips.items() if dip is not None]
+    ends = [(code, dips[low], dips[high]) for code, low, high in between]
+    deliveries = [
+        TankLimit(code, low, high)
+        for code, low, high in ends
+        if None not in (low, high) and low < high
+    ]
+    return (*volumes, *deliveries)
 
 
 def statements(job, table, largest_interpolation_m3):
@@ -57,18 +116,20 @@ def statements(job, table, largest_interpolation_m3):
     Statements
         Volumes at the dips of stated.csv, or by default at the rows next to the quarters of the
         table. Deliveries of stated.csv, then for each minimum height the delivery with the largest
-        U relative to its volume.
+        U relative to its volume. The volumes of the operating levels follow those of their kind.
 
     Raises
     ------
     InputError
-        For a stated dip outside the table.
+        For a stated dip or an operating level outside the table.
     """
-    _refuse_outside(job.stated, table)
+    _refuse_outside(job, table)
+    limits = tank_limits(job.levels, table)
     reading = reading_sources(job.inputs, largest_interpolation_m3)
     dips = [
         stated_delivery.high_m for stated_delivery in job.stated if stated_delivery.low_m is None
     ] or _quarters(table)
+    dips += [limit.high_m for limit in limits if limit.low_m is None]
     worst = _worst(job, table)
     pairs = [
         (stated_delivery.low_m, stated_delivery.high_m)
@@ -80,12 +141,14 @@ def statements(job, table, largest_interpolation_m3):
         for deliveries_of_height in worst
         if deliveries_of_height.at_minimum
     ]
+    pairs += [(limit.low_m, limit.high_m) for limit in limits if limit.low_m is not None]
     return Statements(
-        volumes=tuple(budget(table, dip, reading=reading) for dip in dips),
+        volumes=tuple(budget(table, dip, reading=reading) for dip in dict.fromkeys(dips)),
         deliveries=tuple(
             budget(table, high, low, reading=reading) for low, high in dict.fromkeys(pairs)
         ),
         worst=worst,
+        limits=limits,
     )
 
 
@@ -241,12 +304,19 @@ def _worst(job, table):
     return tuple(worst for worst in worst_by_height.values() if worst is not None)
 
 
-def _refuse_outside(stated, table):
-    """Raise InputError for stated dips outside the table, which ends at the top of the shell."""
+def _refuse_outside(job, table):
+    """Raise InputError for stated dips and levels outside the table (to the top of the shell)."""
+    dips = [
+        (stated_delivery.file, stated_delivery.row, column, dip)
+        for stated_delivery in job.stated
+        for column, dip in (("low_m", stated_delivery.low_m), ("high_m", stated_delivery.high_m))
+    ]
+    levels = {} if job.levels is None else vars(job.levels)
+    dips += [(SETTINGS_FILE, None, f"levels.{name}", dip) for name, dip in levels.items()]
     top = max(round(table.height_m[-1], 3), table.height_m[-1])
     problems = [
         Problem(
-            stated_delivery.file,
+            file,
             message(
                 "stated_outside_table",
                 "found {dip:g}; expected {low:g} to {top:g}, the dips of the table",
@@ -254,11 +324,10 @@ def _refuse_outside(stated, table):
                 low=table.height_m[0],
                 top=top,
             ),
-            stated_delivery.row,
+            row,
             column,
         )
-        for stated_delivery in stated
-        for column, dip in (("low_m", stated_delivery.low_m), ("high_m", stated_delivery.high_m))
+        for file, row, column, dip in dips
         if dip is not None and not table.height_m[0] <= dip <= top
     ]
     if problems:

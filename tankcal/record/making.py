@@ -10,6 +10,7 @@ from tankcal.job.model.parts import Course, Deadwood
 from tankcal.job.model.settings import (
     Datum,
     Inspection,
+    Levels,
     Material,
     Survey,
     Switches,
@@ -54,6 +55,9 @@ class JobAsRead(Saved):
         "data of an inspection; left out if none are given",
         default=None,
         optional=True,
+    )
+    levels: Levels | None = key(
+        "operating levels; left out if none are given", default=None, optional=True
     )
 
 
@@ -119,6 +123,9 @@ class Record(Saved, kw_only=True):
     warnings: list[texts.WarningRecord] = key("problems that did not stop the job")
     adjustment: AdjustmentRecord | None = key("null: points were supplied", default=None)
     budgets: list[table.StatedBudget] = key("stated volumes, then deliveries", default=())
+    limits: list[table.LimitOfTank] | None = key(
+        "volumes of the operating levels; left out if there are none", default=None, optional=True
+    )
     deliveries: list[WorstDeliveries] = key("the worst of each minimum height", default=())
     rule: table.TableJudged | None = key("null: the job has no decision rule", default=None)
     monte_carlo: table.MonteCarlo | None = key("null: it is off", default=None)
@@ -171,6 +178,7 @@ def record_of(result):
             warnings=texts.warnings_of(result.warnings),
             adjustment=adjustment and adjustment_of(adjustment, job.measurements),
             budgets=table.budgets_of(result),
+            limits=result.stated.limits or None,
             deliveries=result.stated.worst,
             rule=table.rule_of(result.rule),
             monte_carlo=table.monte_carlo_of(result),
@@ -208,5 +216,5 @@ def _head_values(job):
     return {
         "versions": versions,
         "files": job.files,
-        "job": fill_from(JobAsRead, job, inspection=job.inspection),
+        "job": fill_from(JobAsRead, job, inspection=job.inspection, levels=job.levels),
     }

@@ -192,6 +192,16 @@ class StatedBudget(Saved):
     lines: list[BudgetLine] = key("of its budget")
 
 
+class LimitOfTank(Saved):
+    """Volume below an operating level or between two; the entry of budgets with its dips has U."""
+
+    code: str = key(
+        "full, maximum, minimum, pump_suction, below_table, working_capacity, pumpable or reserve"
+    )
+    low_m: float | None = key("lower dip; null: the volume below high_m")
+    high_m: float = key("dip")
+
+
 class DipColumns(Saved):
     """Dips of deliveries."""
 

@@ -22,6 +22,7 @@ from tankcal.job.contract.bottom import check_bottom
 from tankcal.job.contract.correlations import check_correlations
 from tankcal.job.contract.courses import check_courses
 from tankcal.job.contract.deadwood import check_deadwood
+from tankcal.job.contract.levels import check_levels
 from tankcal.job.contract.lying import check_horizontal, check_sphere
 from tankcal.job.contract.overrulings import check_overrulings
 from tankcal.job.contract.roof import check_roof
@@ -72,6 +73,7 @@ def check_tank(values, tables, raw, log):
         extent = extent_of(values, tables, kind)
         check_steps(values["table"], extent, raw, log)
         check_settings(values, tables, extent, kind, raw, log)
+        check_levels(values["levels"], extent, raw, log)
         check_plausible(values, tables, extent, kind, raw, log)
     if values is not None:
         _check_of_kind(values, tables, extent, kind, raw, log)

@@ -9,6 +9,7 @@ from tankcal.job.contract import (
     correlations,
     courses,
     deadwood,
+    levels,
     overrulings,
     roof,
     ship,
@@ -31,7 +32,7 @@ from tankcal.text.form_words import NOTES
 
 SECTIONS = (
     *("tank", "survey", "datum", "table", "horizontal", "sphere", "mesh", "ship"),
-    *("bottom", "top", "roof"),
+    *("bottom", "top", "roof", "levels"),
     *("shell", "strapping", "liquid", "radii", "change"),
     *("corrections", "material", "checks", "inspection"),
     *("adjustment", "adjustment.camera", "certificate"),
@@ -46,6 +47,7 @@ for _method in methods():
 COLUMNS |= SURVEY_COLUMNS | overrulings.COLUMNS
 _KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS
 _KEYS |= {"bottom": bottom.KEYS, "top": top.KEYS, "roof": roof.KEYS, "ship": ship.KEYS}
+_KEYS["levels"] = levels.KEYS
 for _method in methods():
     _KEYS |= _method.settings()
 KEYS = {section: _KEYS[section] for section in SECTIONS}

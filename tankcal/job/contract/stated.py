@@ -55,16 +55,23 @@ def check_stated(table, extent, log):
 
 def _check_within(table, row, high, low, extent, log):
     """Check that the dips do not exceed the top of the tank."""
-    top = extent.height_m if extent.top_m is None else extent.top_m
     for column, dip in (("high_m", high), ("low_m", low)):
-        if None not in (dip, top) and dip > top + _ROUNDING_M:
-            expected = message(
-                "stated_above_top",
-                "found {dip:g}; expected at most {top:.5g}, the top of the tank, in metres",
-                dip=dip,
-                top=top,
-            )
+        expected = dip_above_top(dip, extent)
+        if expected:
             log.problem(table.file, expected, row, column)
+
+
+def dip_above_top(dip, extent):
+    """Return the message that a dip exceeds the top of the tank; "" if not, or if unknown."""
+    top = extent.height_m if extent.top_m is None else extent.top_m
+    if None in (dip, top) or dip <= top + _ROUNDING_M:
+        return ""
+    return message(
+        "stated_above_top",
+        "found {dip:g}; expected at most {top:.5g}, the top of the tank, in metres",
+        dip=dip,
+        top=top,
+    )
 
 
 def _check_volume(table, row, high, low, volume, extent, log):

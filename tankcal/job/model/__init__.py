@@ -21,6 +21,7 @@ from tankcal.job.model.settings import (
     Datum,
     DeclaredInput,
     Inspection,
+    Levels,
     Material,
     StatedVolume,
     Survey,
@@ -52,6 +53,7 @@ __all__ = [
     "InputFile",
     "Inspection",
     "Job",
+    "Levels",
     "Material",
     "Mesh",
     "Overruling",
@@ -125,6 +127,8 @@ class Job:
         Largest difference of the diameter as built from a rounded nominal diameter.
     inspection : Inspection or None
         Input of an inspection; None: not given.
+    levels : Levels or None
+        Operating levels; None: not given.
     strapping : Strapping or None
         Circumferences by tape, which replace points.
     lines : ReferenceLines or None
@@ -179,6 +183,7 @@ class Job:
     diameter_is: str | None = None
     diameter_within_m: float | None = None
     inspection: Inspection | None = None
+    levels: Levels | None = None
     strapping: "Strapping | None" = None
     lines: "ReferenceLines | None" = None
     hits: "WallHits | None" = None

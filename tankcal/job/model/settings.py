@@ -58,6 +58,22 @@ class StatedVolume:
 
 
 @dataclass(frozen=True)
+class Levels:
+    """Operating levels of the tank: dips from the zero of the table, m; None: not given.
+
+    Attributes
+    ----------
+    full_m, maximum_m, minimum_m, pump_suction_m : float or None
+        Full tank, safe fill, lowest dip in operation, and lowest dip that can be pumped.
+    """
+
+    full_m: float | None = None
+    maximum_m: float | None = None
+    minimum_m: float | None = None
+    pump_suction_m: float | None = None
+
+
+@dataclass(frozen=True)
 class Tank:
     """The tank: kind, nominal dimensions (None: not given), and texts for the report.
 

@@ -35,6 +35,7 @@ SECTION_NOTES = {
     "bottom": "what the bottom is like; see bottom.csv, too",
     "top": "the head on top, which liquid may rise into; blank: the table ends with the shell",
     "roof": "the floating roof: all of it, or nothing when there is none",
+    "levels": "operating levels, whose volumes are stated on the certificate; may stay empty",
     "corrections": "false switches a correction off, and the report says so",
     "material": "the shell's steel",
     "checks": "only compared, to tell a slip of the hand: nothing here changes a number",

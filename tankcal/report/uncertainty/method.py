@@ -4,7 +4,13 @@ from math import inf
 
 from tankcal.report import blocks, numbers
 from tankcal.report.tables import Column, Table
-from tankcal.report.uncertainty.stated import MARK, flag_simulated, k_of_rows, stated_rows
+from tankcal.report.uncertainty.stated import (
+    MARK,
+    flag_simulated,
+    k_of_rows,
+    limit_rows,
+    stated_rows,
+)
 from tankcal.text.digits import LITRE_DECIMALS, NOTHING
 
 # Inputs that are estimated from the survey.
@@ -226,6 +232,14 @@ def stated_table(record):
         ),
         rows=stated_rows,
     )  # fmt: skip
+
+
+def limits_table(record):
+    """Return the Table of the operating levels: the columns of `stated_table` after the level."""
+    keys = ("high_m", "low_m", "volume_m3", "U_m3", "k", "relative", "interval", "remark")
+    level = Column("tank_limit", words="tank_limits", sheet="tank_limit", width=44)
+    columns = stated_table(record).only(*keys).columns
+    return Table("limits_of_tank", (level, *columns), rows=limit_rows)
 
 
 def remarks(paper, row):

@@ -54,13 +54,32 @@ def stated_rows(record):
     The keys are low_m, high_m, volume_m3, U_m3, k (None: Monte Carlo), dof (None: infinite),
     relative (None: volume 0), low_m3 and high_m3 (None: symmetric interval), simulated and for_use.
     minimum_m is the minimum height for which the delivery is the worst (or None). stated_m3 and
-    note are taken from stated.csv.
+    note are taken from stated.csv. Volumes of the operating levels have a table of their own
+    (`limit_rows`).
     """
     budgets = record.get("budgets", [])
     asked = any(budget.get("stated_m3") is not None or budget.get("note") for budget in budgets)
     if not asked and not any(stated_U_m3(record["capacity"])):
         return []
-    return [_stated(record, budget) for budget in budgets]
+    limits = {_dips(limit) for limit in record.get("limits") or ()}
+    return [
+        _stated(record, budget)
+        for budget in budgets
+        if _dips(budget) not in limits or budget["stated_m3"] is not None or budget["note"]
+    ]
+
+
+def _dips(row):
+    return row["low_m"], row["high_m"]
+
+
+def limit_rows(record):
+    """Return the volumes of the operating levels, as `stated_rows` with the key tank_limit."""
+    budgets = {_dips(budget): budget for budget in record["budgets"]}
+    return [
+        _stated(record, budgets[_dips(limit)]) | {"tank_limit": limit["code"]}
+        for limit in record.get("limits") or ()
+    ]
 
 
 def _stated(record, budget):

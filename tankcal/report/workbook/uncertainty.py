@@ -1,7 +1,7 @@
 """Sheets of budgets, stated volumes, deliveries, Monte Carlo, and decision rule."""
 
 from tankcal.report.uncertainty import budget, monte_carlo, rule
-from tankcal.report.uncertainty.method import stated_table
+from tankcal.report.uncertainty.method import limits_table, stated_table
 from tankcal.report.uncertainty.stated import WORST_DELIVERIES, worst_delivery_rows
 from tankcal.report.workbook.look import number_format
 from tankcal.report.workbook.sections import (
@@ -79,8 +79,11 @@ def _totals(book, sheet, last, values):
 
 
 def deliveries_sheet(book, record):
-    """Write the stated volumes and deliveries, and the worst deliveries."""
+    """Write the stated volumes and deliveries, the operating levels, and the worst deliveries."""
     sections = [cell_table(book, stated_table(record), title=book.word("headings.stated"))]
+    if record.get("limits"):
+        title = book.word("headings.limits_of_tank")
+        sections.append(cell_table(book, limits_table(record), title=title))
     worst = worst_delivery_rows(book.paper)
     if worst:
         title = book.word("headings.worst_deliveries")
