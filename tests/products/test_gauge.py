@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 import numpy as np
+import openpyxl
 import pytest
 from scipy import stats
 
@@ -525,6 +526,39 @@ def test_certificate_and_files(folder, tmp_path, language, capsys):
         assert words["signatures"]["approved"] in text
         assert words["texts"]["end"] in text
         assert text.count("\f") == 2
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_workbook_has_the_main_result_and_the_remarks(tmp_path, language):
+    out = tmp_path / "out"
+    DOCUMENT.write(computed(GAUGE_EXAMPLE), out, language)
+    sheet = openpyxl.load_workbook(out / "gauge.xlsx").worksheets[0]
+    texts = [str(cell.value) for row in sheet for cell in row if cell.value is not None]
+    words = load_words(language)["gauge"]
+    assert {"EX-GAUGE-1", words["headings"]["remarks"]} <= set(texts)
+    assert {*words["standing"].values()} <= set(texts)
+    label = words["labels"]["offset_at"].split("{")[0]
+    at = next(place for place, text in enumerate(texts) if text.startswith(label))
+    assert texts[at + 1].replace(",", ".").startswith("1.48")
+
+
+@pytest.mark.skipif(shutil.which("pdftotext") is None, reason="needs pdftotext")
+def test_long_notes_keep_the_end_mark_with_the_signatures(tmp_path):
+    """Notes of 9 to 13 lines: the end of page 2 falls between signatures and end mark."""
+    words, gauge = load_words("en")["gauge"], computed(GAUGE_EXAMPLE)
+    number = "LABORATORY-2026-000471-COMPARISON-OF-LEVEL-GAUGE-REV-02"
+    counts = set()
+    for lines in range(9, 14):
+        gauge["certificate"] |= {"note": "words " * 11 * lines, "number": number}
+        DOCUMENT.write(gauge, tmp_path / "out")
+        text = subprocess.run(["pdftotext", "-layout", str(tmp_path / "out/gauge.pdf"), "-"],
+                              capture_output=True, text=True, check=True).stdout  # fmt: skip
+        pages = text.split("\f")
+        (last,) = (page for page in pages if words["texts"]["end"] in page)
+        assert words["signatures"]["approved"] in last
+        assert number in pages[0]
+        counts.add(len(pages) - 1)
+    assert counts == {2, 3}
 
 
 def test_papers_are_written_again_in_another_language(folder, tmp_path):

@@ -16,6 +16,7 @@ from tankcal.text.words import load_words
 
 FILE, WORKBOOK, RECORD = "gauge.json", "gauge.xlsx", "record.json"
 DIGEST = 12  # printed digits of a SHA-256
+LONGEST_NUMBER = 60  # letters of the number of a certificate that fit into a line
 _SPACE = "\N{NO-BREAK SPACE}"
 
 
@@ -59,9 +60,14 @@ class GaugePaper(SavedPaper):
             self.word("titles.gauge"),
             self.subject(),
             number_label=self.word("page.number"),
-            number=bearable(self.record["certificate"]["number"] or ""),
+            number=self.certificate_number() or "",
         )
         return [document, masthead]
+
+    def certificate_number(self):
+        """Number of the certificate; shortened only beyond a line of the page, None if blank."""
+        number = self.record["certificate"]["number"]
+        return number if number is None or len(number) <= LONGEST_NUMBER else bearable(number)
 
     def text_with_u(self, value, U, unit="mm"):
         """A value with its U, such as "2.2 mm ± 1.9 mm"; None without a value."""
@@ -117,8 +123,9 @@ def pages(paper, folder=None, whole=False):
         paper.paragraph("corrections"),
         *_zeros(paper),
         *_head_of_liquid(paper),
-        *_remarks(paper),
-        _signature(paper),
+        paper.heading("remarks"),
+        blocks.listing(_remarks(paper)),
+        blocks.with_next(_signature(paper)),  # never the end mark alone on a page
         blocks.end_mark(paper.word("texts.end")),
     ]
 
@@ -154,12 +161,20 @@ def _facts(paper):
     ]  # fmt: skip
 
 
+def _offset(paper):
+    """(label, value) of the main result: the offset at the mean level."""
+    line = paper.record["line"]
+    return (
+        paper.word("labels.offset_at", level=paper.height(round(line["mean_level_m"], 3))),
+        paper.text_with_u(line["offset_mm"], line["U_offset_mm"]),
+    )
+
+
 def _result(paper):
     """Main result: the offset, with the slope below."""
     line = paper.record["line"]
     return blocks.result(
-        paper.word("labels.offset_at", level=paper.height(round(line["mean_level_m"], 3))),
-        paper.text_with_u(line["offset_mm"], line["U_offset_mm"]),
+        *_offset(paper),
         paper.word(
             "texts.slope_note" if line["is_slope_estimated"] else "texts.slope_declared",
             slope=paper.text_with_u(line["slope_mm_per_m"], line["U_slope_mm_per_m"], "mm/m"),
@@ -234,7 +249,7 @@ def _head_of_liquid(paper):
 
 
 def _remarks(paper):
-    """Warnings, assumed uncertainties, standing statements and input files."""
+    """Texts of warnings, assumed uncertainties, standing statements and input files."""
     gauge = paper.record
     assumed = [
         paper.word("texts.u_of_input", name=paper.words["u_inputs"][item["name"]],
@@ -251,7 +266,7 @@ def _remarks(paper):
         sources.append({"file": RECORD, "sha256": gauge["record"]["sha256"]})
     files = ", ".join(f"{item['file']} {item['sha256'][:DIGEST]}" for item in sources)
     texts.append(paper.word("texts.inputs", files=bearable(files)))
-    return [paper.heading("remarks"), blocks.listing(texts)]
+    return texts
 
 
 def _inputs_in_results(gauge):
@@ -294,10 +309,19 @@ def _sheets(book):
     from tankcal.report.workbook.sections import Facts, Sentences, SheetContent, cell_table
 
     paper = book.paper
-    labels = [(paper.label(key), value, None)
-              for key, value in (*_facts(paper), *_line(paper)) if value]  # fmt: skip
+    number = [(paper.word("page.number"), paper.certificate_number())]
+    facts, line = (
+        [(paper.label(key), value) for key, value in pairs]
+        for pairs in (_facts(paper), _line(paper))
+    )
+    lines = [(*pair, None) for pair in (*number, *facts, _offset(paper), *line) if pair[1]]
     decision = paper.decision()
-    parts = [Facts(labels), *([Sentences([decision])] if decision else [])]
+    texts = [*([decision] if decision else []), _slope_text(paper)]
+    parts = [
+        Facts(lines),
+        Sentences(texts),
+        Sentences(_remarks(paper), title=paper.words["headings"]["remarks"]),
+    ]
     yield SheetContent("gauge_result", parts, landscape=False, widths=(42, 58))
     for code, table in (
         ("gauge_corrections", CORRECTIONS),
