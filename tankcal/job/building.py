@@ -14,7 +14,7 @@ from tankcal.job.checks.extent import (
 )
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.entries import ColumnValues, kind_of, read_columns, read_register, read_settings
-from tankcal.job.overrulings import make_overrulings
+from tankcal.job.model.overrulings import Overruling
 from tankcal.job.rule_files import find_rule
 from tankcal.job.tables import (
     REGISTERS,
@@ -28,6 +28,7 @@ from tankcal.methods.base import methods, methods_for
 
 # Columns of upright tanks, with the columns that lying tanks have in their place.
 IN_PLACE = {"course": "ring", "level_m": "from_a_m"}
+_OVERRULING_COLUMNS = ("point", "table", "row", "decision", "reason", "by", "date")
 
 
 def job_of(raw, log, is_whole=True):
@@ -219,4 +220,25 @@ def _attached(raw, values, log):
     return Attached(
         None if mesh is None else read_mesh_file(raw.folder, mesh, log),
         None if rule is None else find_rule(raw, rule, log),
+    )
+
+
+def make_overrulings(table):
+    """`Overruling`s in the order of the file; () without the table."""
+    if table is None:
+        return ()
+    rows = zip(*map(table.of, _OVERRULING_COLUMNS), table.rows, strict=True)
+    return tuple(
+        Overruling(
+            point=point,
+            table=reading_table,
+            reading_row=None if number is None else int(number),
+            decision=decision,
+            reason=reason,
+            by=by or "",
+            date="" if date is None else str(date),
+            row=row,
+            file=table.file,
+        )
+        for point, reading_table, number, decision, reason, by, date, row in rows
     )

@@ -12,9 +12,8 @@ from test_slips_of_crews import book_of, computed
 
 import tankcal
 from tankcal.errors import InputError
-from tankcal.job.checks.survey.packed_dms import chance_of_packed
-from tankcal.methods.hits.misread import refuse_other_units
-from tankcal.methods.hits.misread_lines import refuse_misread_lines
+from tankcal.job.checks.survey.angle_units import chance_of_packed
+from tankcal.methods.hits.misread import refuse_misread_lines, refuse_other_units
 from tankcal.methods.hits.wall import _refuse_stations_outside
 
 IN_METRES = [

@@ -10,8 +10,7 @@ from tankcal.job.checking import (
     tell_missing,
     temperature_missing,
 )
-from tankcal.job.checks.obstructions import check_obstructions
-from tankcal.job.checks.spans import check_spans
+from tankcal.job.checks.obstructions import check_obstructions, check_spans
 from tankcal.job.contract.registers import FREE
 from tankcal.job.plausibility import IMPOSSIBLE_MISS, unit_guess
 from tankcal.job.tables import nearest

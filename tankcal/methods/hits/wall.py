@@ -7,8 +7,11 @@ import numpy as np
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
 from tankcal.methods.hits.checks import offset_unknown
-from tankcal.methods.hits.misread import refuse_other_units
-from tankcal.methods.hits.misread_lines import refuse_misread_heights, refuse_misread_lines
+from tankcal.methods.hits.misread import (
+    refuse_misread_heights,
+    refuse_misread_lines,
+    refuse_other_units,
+)
 from tankcal.pipeline.wall.cause_correlations import told_causes
 from tankcal.pipeline.wall.finding import find_wall
 from tankcal.pipeline.wall.point_covariance import s_transform

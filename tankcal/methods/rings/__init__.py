@@ -65,7 +65,7 @@ class RingsMethod(Method):
         return inside_radii(job, survey)
 
     def part(self, job, survey, switches):
-        from tankcal.methods.rings.part import ringed_part
+        from tankcal.methods.rings.wall import ringed_part
 
         return ringed_part(job, survey, switches)
 

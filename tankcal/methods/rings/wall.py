@@ -1,4 +1,4 @@
-"""Rings of a horizontal cylinder measured by strapping: radii and their uncertainty.
+"""Rings of a horizontal cylinder measured by strapping: inside radii and their uncertainty.
 
 A ring is a cylinder with the mean radius of its straps. Its form between the straps (taper, bulge)
 and the distance of its bottom at the dip from the mean are uncertain. Their prior sizes are those
@@ -18,14 +18,15 @@ from tankcal.geometry.field.estimate import LEVELS, gauss_heights
 from tankcal.geometry.girth import perimeter_excess
 from tankcal.messages import message
 from tankcal.pipeline.checks.nominal_size import InsideRadii
-from tankcal.pipeline.tanks.common import factor_of_unseen
+from tankcal.pipeline.tanks.common import factor_of_unseen, inside_end, is_warmed, thermal_scale
 from tankcal.pipeline.taped_wall import TapedWall, adjust_readings
 from tankcal.pipeline.wall_readings import names_of, readings_of_straps
 from tankcal.pipeline.wall_straps import AreaTerm, gauged_plates
 from tankcal.quadrature import panels
 from tankcal.survey.strapping import reduce_straps, tapes_used
+from tankcal.tank.body import SolidPart
 from tankcal.tank.factors import Factor
-from tankcal.tank.lying import WAVES
+from tankcal.tank.lying import WAVES, RingedTank
 
 # Radius of the measured shell, m. Bulges and drawn-in joints of rings scale with the square root of
 # the radius R. A girth weld that shrinks with the force F draws a plate of thickness t in by
@@ -34,6 +35,7 @@ from tankcal.tank.lying import WAVES
 UPRIGHT_M = 7.5
 FLATTENED = 0.5  # share of the variance round a ring due to its weight on saddles
 KIND_OF_WAVES = {"oval": "ovality", "seam": "seams"}
+SURVEYED = ("ring_radii", "dip_radius", "ring_waves")
 
 
 @dataclass(frozen=True)
@@ -236,4 +238,41 @@ def inside_radii(job, wall):
     plates = np.array([ring.thickness_m + ring.paint_m for ring in job.rings])
     return InsideRadii(
         tuple(names_of(job.rings)), wall.straps.radius_m - plates, plates, np.zeros(len(plates))
+    )
+
+
+def ringed_part(job, wall, switches):
+    """`SolidPart` of a `wall.RingedWall`."""
+    scale, lying = thermal_scale(job, switches), job.horizontal
+    ends_m = lying.thickness_m * switches.plate
+    insets = [
+        switches.plate * ring.thickness_m + switches.paint * ring.paint_m for ring in job.rings
+    ]
+    radii = wall.radius_m - insets
+    tank = RingedTank(
+        tuple(float(scale * radius) for radius in radii),
+        tuple(scale * ring.length_m for ring in job.rings),
+        end_a=inside_end(lying.end_a, 2 * float(wall.radius_m[0]), ends_m, scale),
+        end_b=inside_end(lying.end_b, 2 * float(wall.radius_m[-1]), ends_m, scale),
+        tilt=lying.tilt,
+        dip_from_a_m=scale * lying.dip_from_a_m,
+        dip_direction=lying.dip_direction,
+    )
+    features = wall.features_at(lying.dip_from_a_m)
+    warmed = is_warmed(job, switches)
+    is_used = {
+        "plate_thickness": switches.plate and any(ring.thickness_m for ring in job.rings),
+        "paint": switches.paint and any(ring.paint_m for ring in job.rings),
+    }
+    return SolidPart(
+        tank,
+        scale,
+        job.material.expansion_per_k,
+        warmed=warmed,
+        surveyed=SURVEYED,
+        factors=tuple(
+            factor.mapped(lambda columns: scale * columns) for factor in features.factors(job)
+        ),
+        unused=tuple(name for name, is_relevant in is_used.items() if not is_relevant),
+        read_with=features.read_with() if warmed else {},
     )

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from tankcal.job.checking import has_rows, tiny_sd
-from tankcal.job.checks.survey.gon import check_gon
+from tankcal.job.checks.survey.angle_units import check_gon
 from tankcal.job.contract.observations import ANGLES, READINGS
 from tankcal.messages import message
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from tankcal.errors import SHEET
 from tankcal.job.checking import has_rows
+from tankcal.job.checks.survey.angle_units import refuse_packed
 from tankcal.job.checks.survey.files import tell_rows
 from tankcal.job.checks.survey.instruments import TAKEN_FROM_SETUPS
-from tankcal.job.checks.survey.packed_dms import refuse_packed
 from tankcal.job.contract.observations import ANGLES, READINGS
 from tankcal.job.shared_columns import ANGLE_UNITS
 from tankcal.messages import join_with_or, list_some, message

@@ -1,8 +1,12 @@
-"""Checks for angles in gon declared as degrees, and vice versa.
+"""Checks for columns of angles in another unit than declared.
 
-There are two kinds of evidence. Reciprocal sights: forward and back azimuths differ by half a
-circle; forward and back zenith angles have the sum of half a circle. Known points: coordinates
-determine the angle between them.
+Gon declared as degrees, and vice versa: there are two kinds of evidence. Reciprocal sights: forward
+and back azimuths differ by half a circle; forward and back zenith angles have the sum of half a
+circle. Known points: coordinates determine the angle between them.
+
+Packed degrees, minutes and seconds (12.3045 for 12° 30' 45") declared as decimal degrees: in
+decimal degrees, the second pair of decimals reaches 60 in four of ten readings. Packed minutes and
+seconds never reach 60.
 """
 
 import numpy as np
@@ -19,6 +23,10 @@ OF_KNOWN_DEG = 1.0  # tolerance of angles between known points
 MIN_SIGHTS = 3  # smallest number of such angles
 SAME_HEIGHT_M = 0.1  # largest difference of the heights of instrument and target
 MIN_TURN_DEG = 20.0  # for smaller angles, the units differ by less than 2 degrees
+# Packed degrees
+OF_PAIR, BY_CHANCE = 0.6, 1e-6  # probability of a pair below 60; smallest probability of a column
+EACH = 1e-3  # readings that agree to this interval count once, degrees
+DIGITS = 7  # number of decimals, more than any circle shows
 
 
 def check_gon(files, places):
@@ -154,3 +162,49 @@ def _azimuth_deg(places, at, to):
     if not np.isfinite(dx + dy) or (dx == 0 and dy == 0):
         return None
     return float(np.degrees(np.arctan2(dx, dy)))
+
+
+def chance_of_packed(degrees):
+    """Probability that decimal degrees look as packed as these; 1.0 if a pair reaches 60.
+
+    Parameters
+    ----------
+    degrees : array_like, shape (n,)
+        Values as written. Values with at most two decimals, and repetitions to three decimals, do
+        not count.
+
+    Returns
+    -------
+    float
+
+    Examples
+    --------
+    >>> chance_of_packed([12.3045, 81.0015, 200.594]), chance_of_packed([12.3045, 81.0061])
+    (0.216, 1.0)
+    """
+    values = np.abs(np.asarray(degrees, dtype=float))
+    values = values[np.isfinite(values)]
+    unit = 10**DIGITS
+    decimals = np.rint(values % 1 * unit).astype(int) % unit
+    minutes, seconds = decimals // 10 ** (DIGITS - 2), decimals // 10 ** (DIGITS - 4) % 100
+    if np.any((minutes >= 60) | (seconds >= 60)):
+        return 1.0
+    has_seconds = decimals % 10 ** (DIGITS - 2) > 0
+    return round(OF_PAIR ** len(np.unique(np.floor(values[has_seconds] / EACH + EACH))), 12)
+
+
+def refuse_packed(table, column, log):
+    """Report a column of degrees with packed minutes and seconds."""
+    degrees = table.numbers(column)
+    chance = chance_of_packed(degrees)
+    if chance < BY_CHANCE:
+        first = int(np.argmax(np.isfinite(degrees)))
+        expected = message(
+            "packed_dms",
+            "no minutes or seconds of the {count} angles reach 60 if they are read as degrees,"
+            " minutes and seconds (12.3045 for 12 30 45): expected decimal degrees, or such angles"
+            " in the column {dms}, as 12 30 45",
+            count=int(np.isfinite(degrees).sum()),
+            dms=column.removesuffix("deg") + "dms",
+        )
+        log.problem(table.file, expected, table.rows[first], column)
