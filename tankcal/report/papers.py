@@ -19,6 +19,7 @@ _NOT_IN_ALL = (  # keys that some kinds of record, or records of earlier version
     "radii",
     "ship",
     "overrulings",
+    "limits",
 )
 _PARTS = (  # name of each PDF and the part of the notebook that it contains
     ("certificate.pdf", "certificate"),
