@@ -14,6 +14,7 @@ import tankcal
 from tankcal.report import outputs
 from tankcal.report.paper import Paper
 from tankcal.report.uncertainty.capacity import NOT_FOR_USE, density_blocks
+from tankcal.report.workbook.look import CRITICAL
 
 pytestmark = pytest.mark.slow
 
@@ -107,6 +108,13 @@ def test_workbook_has_sheet_of_bottom_deadwood_and_roof(furnished):
     capacity = cells(book["Capacity"])
     use = capacity[3].index("Use")
     assert [row[0] for row in capacity[4:] if row[use] == "not for use"] == [1.5]
+    for name in ("Capacity", "Other densities"):
+        filled = [
+            row[0].value
+            for row in book[name].iter_rows(min_row=5)
+            if row[0].fill.fgColor.rgb.endswith(CRITICAL.removeprefix("#"))
+        ]
+        assert filled == [1.5]
 
 
 def test_csv_table_has_other_densities_and_not_for_use(furnished):

@@ -7,7 +7,7 @@ from math import ceil, floor
 from tankcal.report.tables.capacity import capacity_rows, capacity_table, parts_table
 from tankcal.report.uncertainty.sources import critical_zone
 from tankcal.report.uncertainty.stated import stated_U_m3
-from tankcal.report.workbook.look import Column, width_of, width_of_lines
+from tankcal.report.workbook.look import CRITICAL, Column, width_of, width_of_lines
 from tankcal.report.workbook.sections import HEAD_ROW, SheetContent, cell_table, write_sheet
 from tankcal.report.workbook.tables import columns_of, set_widths
 from tankcal.text.digits import (
@@ -65,7 +65,7 @@ def capacity_sheet(book, record):
         columns[place] = replace(columns[place], width=wide)
     book.widths(sheet, *map(width_of, columns))
     muted = [row for row, is_for_use in enumerate(capacity["for_use"]) if not is_for_use]
-    last = book.table(sheet, HEAD_ROW, "capacity_table", columns, muted=muted)
+    last = book.table(sheet, HEAD_ROW, "capacity_table", columns, muted=muted, muted_fill=CRITICAL)
     places = {NAMED[key]: place for place, key in enumerate(keys) if key in NAMED}
     position = Rows(HEAD_ROW + 1, last, places)
     book.freeze(sheet, HEAD_ROW)
@@ -109,7 +109,7 @@ def densities_sheet(book, record):
     ]
     muted = [row for row, is_for_use in enumerate(capacity["for_use"]) if not is_for_use]
     set_widths(book, sheet, columns)
-    last = book.table(sheet, HEAD_ROW, "other_densities", columns, muted=muted)
+    last = book.table(sheet, HEAD_ROW, "other_densities", columns, muted=muted, muted_fill=CRITICAL)
     book.freeze(sheet, HEAD_ROW)
     for place in range(2, 1 + len(tables)):
         book.name(name_of_density(place), sheet, HEAD_ROW + 1, last, place)

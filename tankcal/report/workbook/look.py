@@ -13,6 +13,7 @@ ACCENT = "#1F4E79"
 RULE = "#BFC9D4"
 MUTED = "#595959"
 INPUT = "#FFF7DB"
+CRITICAL = "#FCE4D6"  # background of rows in the critical zone of a floating roof
 # Metric-compatible substitutes exist on every system.
 FONT = {"font_name": "Arial", "font_size": 10}
 DATE = 14  # Excel's built-in short date in the format of the reader's system

@@ -215,7 +215,9 @@ class Writer:
 
     # ---- tables
 
-    def table(self, sheet, row, name, columns, muted=(), autofilter=False, widths=None):
+    def table(
+        self, sheet, row, name, columns, muted=(), autofilter=False, widths=None, muted_fill=None
+    ):
         """Write an Excel table.
 
         Parameters
@@ -234,6 +236,8 @@ class Writer:
             True: the headings have filters.
         widths : list of float, optional
             Widths of the columns; None: computed from the columns.
+        muted_fill : str, optional
+            Background of the muted rows; None: none.
 
         Returns
         -------
@@ -244,7 +248,7 @@ class Writer:
         muted = frozenset(muted)
         widths = widths or [width_of(column) for column in columns]
         for place, column in enumerate(columns):
-            self._cells(sheet, row + 1, place, column, muted)
+            self._cells(sheet, row + 1, place, column, muted, muted_fill)
         heads = [
             {"header": column.heading, "header_format": self._head(column)} for column in columns
         ]
@@ -258,12 +262,14 @@ class Writer:
         self._row_heights(sheet, row + 1, columns, widths)
         return row + count
 
-    def _cells(self, sheet, first, place, column, muted):
+    def _cells(self, sheet, first, place, column, muted, muted_fill):
         """Write the cells of a column; each format is created once, since tables may be large."""
         cells, digits = column.cells, column.digits
         each = digits if isinstance(digits, list) else [digits] * len(cells)
         keys = [(cell_digits, index in muted) for index, cell_digits in enumerate(each)]
-        looks = {key: self._cell_look(*key, column.percent) for key in dict.fromkeys(keys)}
+        looks = {
+            key: self._cell_look(*key, column.percent, muted_fill) for key in dict.fromkeys(keys)
+        }
         formats = {key: self.format(**look) for key, look in looks.items()}
         numbers = [value if type(value) is float else None for value in cells]
         sheet.write_numbers(first, place, numbers, [formats[key] for key in keys])
@@ -274,13 +280,16 @@ class Writer:
                 self.put(sheet, row, place, value, **looks[key])
 
     @staticmethod
-    def _cell_look(digits, muted, percent):
+    def _cell_look(digits, muted, percent, muted_fill):
         look = {"bottom": 4, "bottom_color": RULE}
         if digits is None:
             look |= {"text_wrap": True, "align": "left", "indent": 1}
         else:
             look |= {"align": "right", "num_format": number_format(digits, percent)}
-        return look | ({"italic": True, "font_color": MUTED} if muted else {})
+        if muted:
+            look |= {"italic": True, "font_color": MUTED}
+            look |= {"bg_color": muted_fill} if muted_fill else {}
+        return look
 
     def _row_heights(self, sheet, first, columns, widths):
         """Set the heights of the rows of a table for their longest texts."""
