@@ -354,7 +354,7 @@ function differences(tank, table, given, gaugings, steps) {
     tape: u.u_tape / 1e6, thermometer: u.u_thermometer, density: u.u_density, vcf: 1,
     ambient: u.u_ambient, sw: given.sw === null ? 0 : u.u_sw / 100, expansion: u.u_expansion,
   };
-  const factors = {};
+  const [gross, net] = [{}, {}]; // factors of TOV, and of TOV - FW
   let inverse = 0;
   for (const [place, gauging] of Object.entries(gaugings)) {
     standard[`dip ${place}`] = u.u_dip / 1000;
@@ -362,8 +362,9 @@ function differences(tank, table, given, gaugings, steps) {
     standard[`temperature ${place}`] = u.u_temperature;
     standard[`table ${place}`] = tank.interpolation_m3 / Math.sqrt(3);
     const water = gauging.water === null ? null : table.columnsAt(gauging.water);
-    factors[place] = table.columnsAt(gauging.level).map((value, column) =>
-      (value - (water ? water[column] : 0)) / tank.unit_factor);
+    gross[place] = table.columnsAt(gauging.level).map((value) => value / tank.unit_factor);
+    net[place] = gross[place].map((value, column) =>
+      value - (water ? water[column] / tank.unit_factor : 0));
     const { row } = steps[place];
     for (const height of [tank.heights[row], tank.heights[row + 1]]) {
       inverse = Math.max(inverse, table.inverseDof(table.columnsAt(height)));
@@ -372,6 +373,7 @@ function differences(tank, table, given, gaugings, steps) {
   const moved = {};
   for (const name of QUANTITIES) {
     const closing = steps.closing[name];
+    const factors = name === "tov" ? gross : net;
     const total = steps.opening ? minus(closing, steps.opening[name]) : closing;
     const byTable = factors.closing.reduce((variance, _, column) => variance
       + Object.keys(factors).reduce((part, place) =>

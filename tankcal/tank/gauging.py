@@ -36,3 +36,26 @@ KEY_OF_INPUT = {  # input of the budget without its state: key of its standard u
 # distance from the base, which is our own rule.
 VCF_AT_K = np.array([0.0, 22.2, 50.0, 77.8, 105.6])
 VCF_PERCENT = np.array([0.0, 0.05, 0.15, 0.25, 0.35])
+
+
+def assumed_u_vcf(temperature_c, base_c):
+    """Standard uncertainty of a volume correction factor by the assumed rule, relative.
+
+    Parameters
+    ----------
+    temperature_c : float or ndarray
+        Temperature of the liquid, degC.
+    base_c : float
+        Base temperature, degC.
+
+    Returns
+    -------
+    float or ndarray
+        With the sign of the distance from the base, as the error of the model.
+    """
+    distance = np.abs(temperature_c - base_c)
+    # Beyond the last point the last slope goes on, so that U does not stop growing.
+    beyond = np.maximum(distance - VCF_AT_K[-1], 0.0)
+    slope = (VCF_PERCENT[-1] - VCF_PERCENT[-2]) / (VCF_AT_K[-1] - VCF_AT_K[-2])
+    percent = np.interp(distance, VCF_AT_K, VCF_PERCENT) + slope * beyond
+    return np.sign(temperature_c - base_c) * percent / 100 / 1.96

@@ -96,6 +96,22 @@ def test_budget_adds_up():
         np.testing.assert_allclose(result.U, result.k * result.u, rtol=1e-12)
 
 
+def test_free_water_does_not_change_u_of_the_total_volume():
+    dry, wet = (
+        _transfer(
+            _cylinder(), _gauging(2.0, water, 28.0, 25.0), _gauging(9.0, 2 * water, 31.0, 27.0),
+            _product(),
+        ).quantities()
+        for water in (np.nan, 0.5)
+    )  # fmt: skip
+    tov, gov = (QUANTITIES.index(name) for name in ("tov_m3", "gov_m3"))
+    for state, result in wet.items():
+        assert result.u[0, tov] == pytest.approx(dry[state].u[0, tov], rel=1e-12)
+    # The error of the bottom cancels in the volume without water; that of the scale remains.
+    by_table = wet["opening"].contributions["table"][0, gov]
+    assert by_table == pytest.approx(3e-4 * wet["opening"].value[0, gov], rel=1e-9)
+
+
 def test_equal_dips_share_their_errors():
     """Nothing was moved: shared errors cancel, the errors of both dips do not."""
     same = _gauging(6.0, np.nan, 30.0, 25.0)

@@ -1,7 +1,7 @@
 """Reading of tickets: ticket.toml for one ticket, a CSV file beside it for many."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -17,12 +17,14 @@ from tankcal.job.tables import Log, read_bytes
 from tankcal.messages import message
 from tankcal.products.quantity.chain import QUANTITIES, Gauging, Product
 from tankcal.products.quantity.factor_table import read_factor_table
+from tankcal.products.quantity.slips import find_slips
 from tankcal.products.quantity.transfer import STATES, Transfer
 from tankcal.products.settings import read_sections
 from tankcal.record.manifest import digest_of
 from tankcal.tank.gauging import UNCERTAINTIES
 from tankcal.tank.volume_correction.alcohol import Ethanol
 from tankcal.tank.volume_correction.corrections import CORRECTIONS, TABLE
+from tankcal.tank.volume_correction.factors import FactorTable
 from tankcal.tank.volume_correction.petroleum import BASES_C, GROUPS, glass_correction
 from tankcal.tank.volume_correction.ranges import DEGREES, OutsideRangeError
 from tankcal.text.display import volume_text
@@ -157,6 +159,11 @@ class Tickets:
         return self.transfer.quantities()
 
     @property
+    def settings_name(self):
+        """Name of the settings for messages: that of their file, if they have one."""
+        return next(iter(self.files), SETTINGS_NAME)
+
+    @property
     def result_state(self):
         """State of the main result: "moved", or "closing" for a stock."""
         return "moved" if "moved" in self.quantities else "closing"
@@ -239,6 +246,15 @@ def read_tickets(table, settings, rows=None, factors=None):
     InputError
         With every problem of the files.
     """
+    tickets = _read(table, settings, rows, factors)
+    correction = tickets.transfer.product.correction
+    factors = correction if isinstance(correction, FactorTable) else None
+    slips = find_slips(tickets, lambda sections: _read(table, sections, None, factors))
+    return replace(tickets, warnings=(*tickets.warnings, *slips))
+
+
+def _read(table, settings, rows, factors):
+    """`Tickets` without a search for slips that explain a contradiction."""
     log, paths = Log(), []
     if isinstance(settings, Mapping):
         folder, name = Path.cwd(), SETTINGS_NAME

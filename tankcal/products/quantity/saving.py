@@ -1,4 +1,4 @@
-"""The saved form of a ticket, and its computation from the saved form."""
+"""The saved form of a ticket."""
 
 from dataclasses import fields
 
@@ -7,16 +7,10 @@ import numpy as np
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.products.quantity.chain import QUANTITIES
-from tankcal.products.quantity.reading import SETTINGS_NAME, read_tickets
 from tankcal.products.quantity.results import compare
-from tankcal.products.quantity.slips import find_slips
-from tankcal.products.quantity.table import read_table
 from tankcal.products.quantity.transfer import STATES
-from tankcal.products.recomputing import compare_values, find_record
-from tankcal.record.schema import to_plain
 from tankcal.record.texts import warnings_of
 from tankcal.record.ticket import (
-    TICKET,
     ComparisonOfTicket,
     ContributionToTicket,
     FactorsOfTicket,
@@ -89,7 +83,7 @@ def ticket_file(tickets):
             if any(value is not None for value in values.values())
         },
         files=[TicketFileEntry(name, digest) for name, digest in tickets.files.items()],
-        warnings=warnings_of([*tickets.warnings, *find_slips(tickets)]),
+        warnings=warnings_of(tickets.warnings),
     )
 
 
@@ -103,9 +97,8 @@ def document_file(tickets):
     """
     head = tickets.sections["ticket"]
     expected = message("ticket_for_document", "missing; expected for the document of a ticket")
-    settings = next(iter(tickets.files), SETTINGS_NAME)
     problems = [
-        Problem(settings, expected, column=f"ticket.{key}")
+        Problem(tickets.settings_name, expected, column=f"ticket.{key}")
         for key in ("number", "date")
         if head[key] is None
     ]
@@ -245,50 +238,3 @@ def _factors(correction):
         return None
     columns = correction.density_kg_m3, correction.temperature_c, correction.factors
     return FactorsOfTicket(correction.file, *(column.tolist() for column in columns))
-
-
-# ---- computing again
-
-
-def compute_again(saved, folder):
-    """Compute a saved ticket again from its inputs and its record.
-
-    Parameters
-    ----------
-    saved : dict
-        Content of ticket.json.
-    folder : Path
-        Folder to be searched for the record: a record.json in it or in its subfolders.
-
-    Returns
-    -------
-    numbers : int or None
-        Number of the compared values; None: the record was not found.
-    problems : list of Problem
-        Differences.
-    notes : list of Message
-        Checks that were not possible.
-
-    Raises
-    ------
-    InputError
-        If the inputs are not those of a ticket.
-    """
-    path = find_record(folder, saved["table"]["sha256"])
-    if path is None:
-        text = message(
-            "verify_record_not_found",
-            "the record of {file} is not in the folder of the inputs ({folder}): its numbers were "
-            "not computed again",
-            file=TICKET.file, folder=str(folder),
-        )  # fmt: skip
-        return None, [], [text]
-    factors = saved["factors"]
-    if factors is not None:
-        grid = (np.array(factors[key]) for key in ("density_kg_m3", "temperature_c", "factor"))
-        factors = FactorTable(factors["file"], *grid, saved["inputs"]["product"].get("base"))
-    tickets = read_tickets(read_table(path), saved["inputs"], factors=factors)
-    again = to_plain(ticket_file(tickets))
-    for name in ("format", "tankcal", "files", "warnings", "inputs"):
-        del again[name]
-    return *compare_values(TICKET.file, saved, again), []

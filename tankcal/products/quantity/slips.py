@@ -9,39 +9,37 @@ import numpy as np
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.products.quantity.reading import SETTINGS_NAME, read_tickets
 from tankcal.products.quantity.results import compare
-from tankcal.tank.volume_correction.factors import FactorTable
 from tankcal.tank.volume_correction.ranges import DEGREES
 
 OTHER_BASES_C = {"15C": 20.0, "20C": 15.0, "60F": 20.0}  # another customary base
 STATES = ("opening", "closing")
 
 
-def find_slips(tickets):
+def find_slips(tickets, read):
     """Slips that would explain why a single ticket contradicts the other party.
 
     Parameters
     ----------
     tickets : Tickets
         A single ticket.
+    read : callable
+        Tickets of this table from {section: {key: value}}; raises InputError.
 
     Returns
     -------
     tuple of Problem
         Warnings; empty if there is no comparison, or if it agrees.
     """
-    e_n = _e_n(tickets)
-    if len(tickets.names) != 1 or e_n is None or abs(e_n) <= 1:
+    if len(tickets.names) != 1 or tickets.compared is None:
         return ()
-    file = next(iter(tickets.files), SETTINGS_NAME)
-    correction = tickets.transfer.product.correction
-    factors = correction if isinstance(correction, FactorTable) else None
-    table = tickets.transfer.table
+    e_n = _e_n(tickets)
+    if e_n is None or abs(e_n) <= 1:
+        return ()
     slips = []
-    for key, text, changed in _candidates(tickets.sections, table):
+    for key, text, changed in _candidates(tickets.sections, tickets.transfer.table):
         try:
-            other = _e_n(read_tickets(table, _drop_blanks(changed), factors=factors))
+            other = _e_n(read(_drop_blanks(changed)))
         except InputError:  # the changed ticket is impossible
             continue
         if abs(other) <= 1:
@@ -49,7 +47,7 @@ def find_slips(tickets):
                 "ticket_slip", "would explain the difference (E_n {e_n:.2f}): {slip}?", e_n=other,
                 slip=text,
             )  # fmt: skip
-            slips.append(Problem(file, expected, column=key))
+            slips.append(Problem(tickets.settings_name, expected, column=key))
     return tuple(slips)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from tankcal.gum.coverage import coverage_factor, dof_of
 from tankcal.products.quantity.chain import QUANTITIES, Gauging, Product, Steps, follow_chain
 from tankcal.products.quantity.table import TankTable
-from tankcal.tank.gauging import VCF_AT_K, VCF_PERCENT
+from tankcal.tank.gauging import assumed_u_vcf
 
 STEP = 1e-30  # of complex steps; far below rounding, so that derivatives are exact
 STATES = ("opening", "closing")
@@ -63,7 +63,7 @@ class Transfer:
         for name, u in inputs:
             for state in self.gaugings:
                 contributions[state][name] = slopes[name][state] * np.reshape(u, (-1, 1))
-        table_parts = {state: [part] for state, part in self._table_parts(slopes).items()}
+        table_parts = self._table_parts(slopes)
         dof = {
             state: self.table.dof_at(gauging.level_m) for state, gauging in self.gaugings.items()
         }
@@ -74,8 +74,8 @@ class Transfer:
                 name: contributions[closing][name] - contributions[opening][name]
                 for name, _ in inputs
             }
-            (slope, factor), *_ = table_parts[opening]
-            table_parts["moved"] = [*table_parts[closing], (-slope, factor)]
+            negative = [(-slope, factor) for slope, factor in table_parts[opening]]
+            table_parts["moved"] = [*table_parts[closing], *negative]
             dof["moved"] = np.minimum(dof[opening], dof[closing])
         return {
             state: _combine(
@@ -118,13 +118,7 @@ class Transfer:
         """Standard uncertainty of the volume correction at each temperature, relative, (n,)."""
         if self.u["u_vcf_percent"] is not None:
             return self.u["u_vcf_percent"] / 100
-        distance = np.abs(temperature_c - self.product.correction.base_c)
-        # Beyond the last point the last slope goes on, so that U does not stop growing.
-        beyond = np.maximum(distance - VCF_AT_K[-1], 0.0)
-        slope = (VCF_PERCENT[-1] - VCF_PERCENT[-2]) / (VCF_AT_K[-1] - VCF_AT_K[-2])
-        percent = np.interp(distance, VCF_AT_K, VCF_PERCENT) + slope * beyond
-        # The model error has the sign of the distance from the base.
-        return np.sign(temperature_c - self.product.correction.base_c) * percent / 100 / 1.96
+        return assumed_u_vcf(temperature_c, self.product.correction.base_c)
 
     def _standard_uncertainties(self):
         """Yield (name, standard uncertainty (n,)) of each input."""
@@ -152,18 +146,23 @@ class Transfer:
         return {state: _values(steps[state], np.imag) / STEP for state in steps}
 
     def _table_parts(self, slopes):
-        """{state: (derivatives of the quantities by a volume, factor of the volumes)}.
+        """{state: [(derivatives of the quantities by a volume, factor of the volume)]}.
 
-        The derivatives have the shape (n, quantities), the factor (n, inputs).
+        The volumes are those at the liquid and at the free water. The derivatives have the shape
+        (n, quantities), the factor (n, inputs).
         """
         parts = {}
         for state, gauging in self.gaugings.items():
             # An error of the table acts like one of interpolation, at the liquid and at the water.
-            factor = self.table.factor(gauging.level_m)
+            by_liquid = slopes[f"interpolation {state}"][state]
             has_water = np.isfinite(gauging.water_m)
             water_m = np.where(has_water, gauging.water_m, self.table.height_m[0])
-            factor = factor - has_water[:, None] * self.table.factor(water_m)
-            parts[state] = slopes[f"interpolation {state}"][state], factor
+            by_water = np.where(has_water[:, None], -by_liquid, 0.0)
+            by_water[:, QUANTITIES.index("tov_m3")] = 0.0  # contains the water
+            parts[state] = [
+                (by_liquid, self.table.factor(gauging.level_m)),
+                (by_water, self.table.factor(water_m)),
+            ]
         return parts
 
 
@@ -195,7 +194,7 @@ def _values(steps: Steps, part=np.real):
 
 
 def _table_variance(parts):
-    """Variance (n, quantities) by the table, from (derivatives, factor) of one state or of two."""
+    """Variance (n, quantities) by the table, from the (derivatives, factor) of its volumes."""
     variance = np.zeros(parts[0][0].shape)
     # One quantity at a time: all of them together need gigabytes for 100 000 tickets.
     for place in range(variance.shape[1]):

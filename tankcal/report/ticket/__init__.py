@@ -127,7 +127,7 @@ DOCUMENT = SavedDocument(
     ),
     tables=TABLES,
     others={XML: _write_xml},
-    recomputed_by="tankcal.products.quantity.saving:compute_again",
+    recomputed_by="tankcal.products.quantity.recomputation:compute_again",
 )
 FILES, refuse_foreign, rebuild = DOCUMENT.files, DOCUMENT.refuse_foreign, DOCUMENT.rebuild
 

@@ -132,15 +132,16 @@ def _table_rows(table):
                                float(_INFINITE))]  # fmt: skip
 
 
-def _factor(state):
-    """Formula of the row of the covariance factor of TOV - FW of a gauging."""
+def _factor(state, *, is_net):
+    """Formula of the row of the covariance factor of TOV of a gauging, or of TOV - FW."""
 
     def at(key):
         low, high = (f"INDEX(covariance_factor,[use_{key}_row_{state}]{end},0)"
                      for end in ("", "+1"))  # fmt: skip
         return f"({low}*(1-[use_{key}_part_{state}])+{high}*[use_{key}_part_{state}])"
 
-    return f"({at('tov')}-[use_has_water_{state}]*{at('water')})"
+    water = f"-[use_has_water_{state}]*{at('water')}" if is_net else ""
+    return f"({at('tov')}{water})"
 
 
 def _combination(table):
@@ -148,14 +149,14 @@ def _combination(table):
     is_stock, good = "[level_state_o]=#opening_blank", "[state_c]=#fine"
     complete = f"AND({good},OR({is_stock},[state_o]=#fine))"
     probability = table.job["table"]["coverage_probability"]
-    symbols = {"table": "u²(TOV - FW)", "u": "u", "dof": "ν", "k": "k", "U": "U"}
+    symbols = {"table": "u² (V)", "u": "u", "dof": "ν", "k": "k", "U": "U"}
     parts = {key: [] for key in symbols}
     has_roof = bool(table.record["roof"])
     for name in QUANTITIES:
         by_table = "0"
         if table.capacity["inputs"]:
             slopes = [f"[interpolation_{name}_{state}]" for state in STATES]
-            factors = [_factor(state) for state in STATES]
+            factors = [_factor(state, is_net=name != "tov") for state in STATES]
             by_table = f"SUMPRODUCT(({slopes[1]}*{factors[1]}-{slopes[0]}*{factors[0]})^2)"
         independent = "+".join(
             f"SUMPRODUCT((([{OWN[0]}_{name}_{s}]:[{OWN[-1]}_{name}_{s}])"
