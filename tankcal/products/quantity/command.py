@@ -63,7 +63,6 @@ def _ticket(options):
     speak_of_record(options.language, options.record)
     from tankcal.products.quantity.reading import read_tickets
     from tankcal.products.quantity.results import rows_of, write_rows
-    from tankcal.products.quantity.slips import find_slips
     from tankcal.products.quantity.table import read_table
     from tankcal.report.outputs import record_file
 
@@ -77,16 +76,15 @@ def _ticket(options):
     show, written = Progress(options.quiet or options.machine), ()
     if is_folder:
         written = _write_document(tickets, options.out, show)
-    warnings = [*tickets.warnings, *find_slips(tickets)]
     rows = rows_of(tickets, tickets.quantities, tickets.transfer.steps)
     if options.out is not None and not is_folder:
         write_rows(Path(options.out), rows)
     if options.machine:
         print_json(exit_status=0, tank=table.tank, record=table.digest,
                    correction=tickets.transfer.product.correction.name, tickets=rows,
-                   warnings=[problem_of(warning) for warning in warnings])  # fmt: skip
+                   warnings=[problem_of(warning) for warning in tickets.warnings])  # fmt: skip
         return 0
-    warn(warnings)
+    warn(tickets.warnings)
     if options.tickets is None:
         _tell(tickets)
     else:
@@ -150,11 +148,11 @@ def _tell(tickets):
     paper = TicketPaper(to_plain(ticket_file(tickets)), language_of_run())
     saved = paper.record
     head = paper.word("titles.ticket"), paper.subject(), paper.correction()
-    print(printable(" ".join(head)))
-    for state in dict.fromkeys(row["state"] for row in saved["gaugings"]):
-        steps = "; ".join(step_text(paper, row, state) for row in saved["steps"])
-        name = paper.words["states"][state]
-        print(f"{name}: {steps}")
+    print(printable(" · ".join(head)))
+    states = [row["state"] for row in saved["gaugings"]]
+    print("; ".join(paper.words["states"][state] for state in states))
+    for row in saved["steps"]:
+        print(" ", step_text(paper, row, states))
     for row in saved["quantities"]:
         say(_quantity_line(paper, row))
     for line in _budget_lines(paper):
@@ -164,7 +162,7 @@ def _tell(tickets):
 
 
 def _quantity_line(paper, row):
-    from tankcal.report.ticket.tables import QUANTITY_UNITS, dof_text
+    from tankcal.report.ticket.tables import QUANTITY_UNITS, dof_text, unit_symbol
 
     written = format_with_u(row["value"], row["U"], marks())
     return message(
@@ -173,7 +171,7 @@ def _quantity_line(paper, row):
         state=paper.words["states"][row["state"]],
         quantity=paper.words["quantities"][row["quantity"]],
         value=written.value,
-        unit=QUANTITY_UNITS[row["quantity"]],
+        unit=unit_symbol(QUANTITY_UNITS[row["quantity"]]),
         U=written.uncertainty,
         k=paper.number(row["k"], decimals=2),
         dof=dof_text(paper, row["dof"]),
@@ -190,7 +188,7 @@ def _budget_lines(paper):
     for row in rows[:SHOWN]:
         yield message(
             "ticket_contribution",
-            "  {name}: {value} m3, {share} % of the variance ({origin})",
+            "  {name}: {value} m³, {share} % of the variance ({origin})",
             name=paper.input_name(row),
             value=paper.number(abs(row["contribution"]), decimals=3),
             share=paper.number(100 * row["share"], decimals=1),
@@ -211,7 +209,7 @@ def _ticket_lines(tickets):
         written = format_with_u(result.value[row, place], result.U[row, place], marks())
         yield message(
             "ticket_line",
-            "  {name}: {state}, {quantity} {value} m3, U = {U} m3",
+            "  {name}: {state}, {quantity} {value} m³, U = {U} m³",
             name=name,
             state=words["states"][state],
             quantity=words["quantities"]["nsv_m3"],

@@ -14,8 +14,7 @@ from tankcal.products.quantity.reading import (
 )
 from tankcal.products.quantity.transfer import STATES
 from tankcal.tank.gauging import ASSUMPTIONS
-from tankcal.text.digits import shortest
-from tankcal.text.words import load_words, marks_of
+from tankcal.text.words import load_words
 
 SECTIONS = {  # in the order of the form
     "ticket": TICKET,
@@ -64,18 +63,19 @@ def starter_text(table, language, file):
                 choices = form["one_of"].format(choices=", ".join(field.choices))
                 note = f"{note}; {choices}"
             if section == "uncertainty":
-                note = f"{note}; {_assumption(form, field.name, marks_of(words))}"
+                note = f"{note}; {_assumption(form, field.name)}"
             if field.required or field.name in TO_FILL_IN.get(section, ()):
                 note = f"{form['fill_in']}: {note}"
             lines.append(f"{field.name + ' = ' + chr(34) * 2:<28} # {note}")
     return "\n".join(lines) + "\n"
 
 
-def _assumption(form, name, marks):
+def _assumption(form, name):
+    """Note on the value of a blank uncertainty, with a decimal point as in the file."""
     value, origin = ASSUMPTIONS[name]
     if value is None:
         return form["rule"]
-    return form[origin].format(value=shortest(value, marks))
+    return form[origin].format(value=f"{value:g}")
 
 
 def write_starter(path, table, language):

@@ -12,6 +12,7 @@ from tankcal.report.ticket.tables import (
     result_rows,
     unit_symbol,
 )
+from tankcal.tank.volume_correction.petroleum import BASE_NAMES
 from tankcal.text.digits import fixed, format_with_u, shortest
 
 DIGEST = 16  # number of printed digits of the SHA-256 of the record
@@ -133,10 +134,13 @@ def _gaugings(paper):
 def _properties(paper):
     """Return the properties of the product and of the shell."""
     saved = paper.record
-    density = paper.number(saved["density_kg_m3"], "kg/m3", decimals=1)
+    density = _reading(paper, saved["density_kg_m3"], "kg/m3")
     if saved["density_temperature_c"] is not None:
         celsius = paper.plain(saved["density_temperature_c"], "°C")
-        density = paper.word("texts.density_observed", density=density, temperature=celsius)
+        scale = saved["inputs"]["product"].get("hydrometer")  # such as "glass 20C"
+        key = "texts.density_by_glass" if scale else "texts.density_observed"
+        scale = BASE_NAMES[scale.split()[-1]] if scale else None
+        density = paper.word(key, density=density, temperature=celsius, scale=scale)
     else:
         celsius = paper.plain(round(saved["base_c"], 2), "°C")
         density = paper.word("texts.density_at_base", density=density, temperature=celsius)
@@ -156,11 +160,20 @@ def _gauging(paper, row):
         ("ullage", paper.height(row["ullage_m"])),
         ("dip", paper.height(row["level_m"])),
         ("water", paper.height(row["water_dip_m"])),
-        ("liquid", paper.number(row["temperature_c"], "degC", decimals=1)),
-        ("air", paper.number(row["ambient_c"], "degC", decimals=1)),
+        ("liquid", _reading(paper, row["temperature_c"], "degC")),
+        ("air", _reading(paper, row["ambient_c"], "degC")),
         ("pressure", paper.plain(row["pressure_kpa"] or None, "kPa")),
     ]
     return ", ".join(f"{words[key]} {text}" for key, text in readings if text is not None)
+
+
+def _reading(paper, value, unit):
+    """Return a reading with at least one decimal and all declared decimals."""
+    if value is None:
+        return None
+    exact = round(value, 4)
+    decimals = next((d for d in (1, 2, 3) if round(value, d) == exact), 4)
+    return paper.number(value, unit, decimals=decimals)
 
 
 def notes(paper):

@@ -1,6 +1,7 @@
 """Tables of a ticket, declared once for PDF, web page, workbook and CSV, and their rows."""
 
 from tankcal.report.tables import Column, Table
+from tankcal.tank.gauging import assumed_u_vcf
 from tankcal.text.digits import NOTHING, fixed, format_with_u, shortest
 
 QUANTITY_UNITS = {  # in the order of the calculation
@@ -99,10 +100,11 @@ def _step_value(key):
     return text
 
 
-def step_text(paper, row, state):
-    """Return the name, value and unit of a step of an opening or closing gauging."""
-    name, value = paper.words["steps"][row["step"]], _step_value(state)(paper, row)
-    return f"{name} {value} {unit_symbol(row['unit'])}".strip()
+def step_text(paper, row, states):
+    """Return the name of a step with its values in some states and its unit."""
+    name = paper.words["steps"][row["step"]]
+    values = "; ".join(_step_value(state)(paper, row) for state in states)
+    return f"{name}: {values} {unit_symbol(row['unit'])}".strip()
 
 
 def _step_name(paper, row):
@@ -205,8 +207,11 @@ def _u_of_input(paper, row):
     if key is None:
         return None
     value = _uncertainty(paper, key)["value"]
-    if value is None:
-        return paper.words["origins"]["rule"]
+    if value is None:  # by the rule, at the temperature of each gauging
+        base_c, gaugings = paper.record["base_c"], paper.record["gaugings"]
+        each = [abs(100 * assumed_u_vcf(row["temperature_c"], base_c)) for row in gaugings]
+        text = "; ".join(fixed(percent, 3, paper.marks) for percent in each)
+        return f"{text} {U_UNITS[key]}"
     text = shortest(value, paper.marks)
     return f"{text} {U_UNITS[key]}"
 

@@ -80,7 +80,7 @@ class Ethanol:
     """Volume correction of ethanol with water to 20 degC by OIML R 22."""
 
     base_c = BASE_C
-    name = message("correction_r22", "OIML R 22:1975, ethanol and water, base 20C")
+    name = message("correction_r22", "OIML R 22:1975, ethanol and water, base 20 °C")
 
     def factor(self, density, temperature_c, pressure_kpa=0.0):
         """Volume correction factor rho(p, t) / rho(p, 20 degC) of a density at 20 degC.

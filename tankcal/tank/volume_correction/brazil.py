@@ -74,9 +74,9 @@ class Brazil:
         """Name of the correction, for reports."""
         if self.is_rounded:
             return message(
-                "correction_cnp_rounded", "Resolução CNP 6/70, rounded as its tables, base 20C"
+                "correction_cnp_rounded", "Resolução CNP 6/70, rounded as its tables, base 20 °C"
             )
-        return message("correction_cnp_unrounded", "Resolução CNP 6/70, unrounded, base 20C")
+        return message("correction_cnp_unrounded", "Resolução CNP 6/70, unrounded, base 20 °C")
 
     def factor(self, density, temperature_c, pressure_kpa=0.0):
         """Volume correction factor to 20 degC.

@@ -6,7 +6,7 @@ from tankcal.messages import message
 from tankcal.tank.volume_correction.alcohol import Ethanol
 from tankcal.tank.volume_correction.brazil import Brazil
 from tankcal.tank.volume_correction.gases import LiquefiedGas
-from tankcal.tank.volume_correction.petroleum import BASES_C, Petroleum
+from tankcal.tank.volume_correction.petroleum import BASE_NAMES, BASES_C, Petroleum
 from tankcal.tank.volume_correction.ranges import refuse_outside
 
 LEAST_C, MOST_C = -60.0, 200.0  # temperatures taken with a constant coefficient
@@ -35,7 +35,7 @@ class Constant:
     def name(self):
         """Name of the correction, for reports."""
         return message("correction_coefficient", "alpha = {alpha:g}/K, base {base}",
-                       alpha=self.alpha_per_k, base=self.base)  # fmt: skip
+                       alpha=self.alpha_per_k, base=BASE_NAMES[self.base])  # fmt: skip
 
     def factor(self, density, temperature_c, pressure_kpa=0.0):
         """Volume correction factor, as `Petroleum.factor`; it does not depend on the density."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.messages import message
-from tankcal.tank.volume_correction.petroleum import BASES_C
+from tankcal.tank.volume_correction.petroleum import BASE_NAMES, BASES_C
 from tankcal.tank.volume_correction.ranges import refuse_not_converged, refuse_outside
 
 ROUNDS, CONVERGED = 60, 1e-12  # of the iteration for the density at the base
@@ -50,7 +50,10 @@ class FactorTable:
     def name(self):
         """Name of the correction, for reports."""
         return message(
-            "correction_table", "table {file}, base {base}", file=self.file, base=self.base
+            "correction_table",
+            "table {file}, base {base}",
+            file=self.file,
+            base=BASE_NAMES[self.base],
         )
 
     def factor(self, density, temperature_c, pressure_kpa=0.0):

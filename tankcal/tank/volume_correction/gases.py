@@ -68,7 +68,7 @@ class LiquefiedGas:
     """Volume correction of liquefied petroleum gas to 60 degF by GPA TP-27."""
 
     base_c = BASE_C
-    name = message("correction_tp27", "GPA TP-27, liquefied petroleum gas, base 60F")
+    name = message("correction_tp27", "GPA TP-27, liquefied petroleum gas, base 60 °F")
 
     def factor(self, density, temperature_c, pressure_kpa=0.0):
         """Volume correction factor of the saturated liquid.

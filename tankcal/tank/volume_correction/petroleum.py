@@ -20,6 +20,7 @@ from tankcal.tank.volume_correction.ranges import refuse_not_converged, refuse_o
 
 EDITIONS, GROUPS = (1980, 2004), ("crude", "products", "lubricants")
 BASES_C = {"15C": 15.0, "20C": 20.0, "60F": (60.0 - 32.0) / 1.8}
+BASE_NAMES = {"15C": "15 °C", "20C": "20 °C", "60F": "60 °F"}  # for readers
 WATER_1980, WATER_2004 = 999.012, 999.016  # kg/m3 at 60 degF, of the API gravity
 KPA_PER_PSI = 6.894757
 
@@ -144,8 +145,9 @@ class Petroleum:
             group = message("group_coefficient", "alpha = {alpha:g}/K", alpha=self.alpha_per_k)
         else:
             group = _GROUP_NAMES[self.group]
+        edition, base = f"{self.edition % 100:02d}", BASE_NAMES[self.base]
         return message("correction_d1250", "ASTM D1250-{edition}, {of}, base {base}",
-                       edition=f"{self.edition % 100:02d}", of=group, base=self.base)  # fmt: skip
+                       edition=edition, of=group, base=base)  # fmt: skip
 
     def factor(self, density, temperature_c, pressure_kpa=0.0):
         """Volume correction factor from a temperature and gauge pressure to the base.
