@@ -1,5 +1,6 @@
 """Volumes of the operating levels: closed form, cancelling errors, refusals, and the papers."""
 
+from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -12,6 +13,8 @@ import tankcal
 from tankcal.errors import InputError
 from tankcal.record import record_of, save
 from tankcal.record.schema import to_plain
+from tankcal.report.paper import Paper
+from tankcal.report.uncertainty.method import remarks
 from tankcal.report.uncertainty.stated import limit_rows, stated_rows
 from tankcal.report.workbook import write
 
@@ -114,6 +117,43 @@ def test_a_level_that_is_refused(tmp_path, levels, column, words):
     (problem,) = caught.value.problems
     assert (problem.file, problem.column) == ("job.toml", f"levels.{column}")
     assert words in problem.expected
+
+
+def test_a_level_above_the_computed_table_is_refused(tmp_path):
+    """As for a scan, whose top is not known before the calculation."""
+    job = job_with(tmp_path)
+    with pytest.raises(InputError) as caught:
+        tankcal.run(replace(job, levels=replace(job.levels, full_m=9.7)))
+    (problem,) = caught.value.problems
+    assert (problem.file, problem.column) == ("job.toml", "levels.full_m")
+    assert "found 9.7; expected 0 to 9.5, the dips of the table" in problem.expected
+
+
+def test_a_level_in_the_critical_zone_is_marked(tmp_path):
+    roof = {
+        "roof.mass_kg": 9000.0,
+        "roof.critical_bottom_m": 1.0,
+        "roof.critical_top_m": 1.6,
+        "roof.reference_density_kg_m3": 850.0,
+        "roof.weighing": "air",
+    }
+    rows, record = limits_of(job_with(tmp_path, **roof))
+    assert [code for code, row in rows.items() if not row["for_use"]] == [
+        "minimum",
+        "working_capacity",
+    ]
+    save(record, tmp_path / "record.json")
+    remark = remarks(Paper(tmp_path / "record.json"), rows["minimum"])
+    assert remark == ["not for use"]
+
+
+def test_a_record_without_levels_has_no_such_heading(tmp_path):
+    _, with_levels = limits_of(job_with(tmp_path / "with"))
+    without = to_plain(record_of(tankcal.run(job_with(tmp_path / "without", {}))))
+    for record, count in ((with_levels, 1), (without, 0)):
+        save(record, tmp_path / "record.json")
+        texts = [block.get("text") for block in paper_blocks(tmp_path / "record.json")]
+        assert texts.count("Operating levels") == count
 
 
 @pytest.mark.filterwarnings("ignore:.*extension is not supported:UserWarning")
