@@ -14,7 +14,7 @@ from pathlib import Path
 from tankcal.batch.options import FOLDERS, STEPS
 from tankcal.errors import InputError
 from tankcal.record import manifest
-from tankcal.report.batch.paper import OF_RULE, STATUSES
+from tankcal.report.batch import OF_RULE, STATUSES
 from tankcal.text.words import load_words
 
 JOBS, FILE, FORMAT = "jobs", "outcome.json", "tankcal-outcome/1"

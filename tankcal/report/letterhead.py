@@ -1,14 +1,17 @@
 """Letterhead of the laboratory: name, address, logo and colours, from a TOML file.
 
 The file is checked when it is read. The papers take the letterhead from the document block of the
-executed notebook.
+executed notebook. A logo must be a self-contained picture without programs or external links.
 """
 
 import base64
+import io
 import json
 import re
+import struct
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from xml.etree import ElementTree
 
 from tankcal.errors import InputError, Problem, reason_of
 from tankcal.job.entries import read_section
@@ -16,9 +19,20 @@ from tankcal.job.fields import Field
 from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml
 from tankcal.job.tables import Log, nearest, read_bytes
 from tankcal.messages import message
-from tankcal.report.logo import logo_problem
 from tankcal.text.delimited import read_json
 
+MAX_LOGO_BYTES = 500_000  # largest size of the file
+MAX_LOGO_PIXELS = 4000  # pixels along a side
+MAX_DRAWN = 100_000  # elements of an SVG after the expansion of its references
+_SVG = "{http://www.w3.org/2000/svg}"
+_PNG = b"\x89PNG\r\n\x1a\n"  # first bytes of a PNG file
+_ACTIVE = {  # SVG elements with programs, animation or foreign content
+    "script", "foreignObject", "set", "animate", "animateMotion", "animateTransform", "handler",
+    "iframe", "embed", "object", "audio", "video", "discard",
+}  # fmt: skip
+_EMBEDDED = re.compile(r"data:image/(png|jpeg);base64,[A-Za-z0-9+/=\s]*")
+_URL = re.compile(r"url\s*\(\s*[\"']?\s*(.)", re.IGNORECASE)
+_REFERENCE = re.compile(r"url\s*\(\s*[\"']?\s*#([^\"')\s]+)", re.IGNORECASE)
 LETTERHEAD_FILE = "letterhead.json"  # saved beside a notebook whose papers have a letterhead
 PLACE = "place"  # value of a mark that is an empty frame
 LEAST_CONTRAST = 4.5  # smallest contrast of text with white paper: WCAG 2.2, 1.4.3
@@ -37,6 +51,111 @@ _COLOURS = (
     Field("line", "text", "of thin rules, such as #9aa5b1", start="#9aa5b1"),
 )
 _SECTIONS = {"laboratory": _LABORATORY, "colours": _COLOURS}
+
+
+def logo_problem(kind, data):
+    """Return the reason why the bytes of an "svg" or "png" file are no valid logo, or None."""
+    if len(data) > MAX_LOGO_BYTES:
+        return f"has {len(data) / 1000:.0f} kB; expected at most {MAX_LOGO_BYTES / 1000:.0f} kB"
+    return svg_problem(data) if kind == "svg" else png_problem(data)
+
+
+def svg_problem(data):
+    """Return the reason why the bytes of an SVG are no valid logo, or None."""
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return "is no UTF-8 text; expected an SVG"
+    for mark in ("<!DOCTYPE", "<!ENTITY", "<?xml-stylesheet"):
+        if mark.lower() in text.lower():
+            return f"has {mark}; expected a plain SVG, without it"
+    try:
+        root = ElementTree.fromstring(text)
+    except (ElementTree.ParseError, ValueError, RecursionError) as error:
+        return f"cannot be read as an SVG ({error})"
+    if root.tag != f"{_SVG}svg":
+        return "expected an SVG: <svg> of the SVG namespace outermost"
+    if "viewBox" not in root.attrib and not {"width", "height"} <= set(root.attrib):
+        return "has no size; expected a viewBox, or width and height"
+    problems = (problem for element in root.iter() if (problem := _element_problem(element)))
+    return next(problems, None) or _expansion_problem(root)
+
+
+def _element_problem(element):
+    name = _local(element.tag)
+    if name in _ACTIVE:
+        return f"has <{name}>; expected a picture without programs or animation"
+    for key, value in element.attrib.items():
+        key = _local(key)
+        if key.lower().startswith("on"):
+            return f"has {key}=; expected a picture without programs"
+        is_link = key in ("href", "src")
+        if is_link and not (value.strip().startswith("#") or _EMBEDDED.fullmatch(value.strip())):
+            return f"links to {value[:60]!r}; expected everything inside the file"
+        if not is_link and _leads_out(value):
+            return f"{key}= leads out of the file: {value[:60]!r}"
+    if name == "style" and _leads_out(element.text or ""):
+        return "its <style> leads out of the file; expected everything inside"
+    return None
+
+
+def _leads_out(text):
+    """Return whether a style or value may refer to another file; escapes could hide this."""
+    if any(start != "#" for start in _URL.findall(text)):
+        return True
+    return "@import" in text.lower() or ("\\" in text and "(" in text)
+
+
+def _local(name):
+    return name.rpartition("}")[2]
+
+
+def _expansion_problem(root):
+    """Return a problem if references are circular or expand to too many elements."""
+    by_id = {part.attrib["id"]: part for part in root.iter() if "id" in part.attrib}
+    sizes, open_ = {}, set()
+
+    def size(element):
+        # An element that is still being counted refers to itself.
+        """Return the number of drawn elements, limited to MAX_DRAWN + 1."""
+        if element in open_:
+            return MAX_DRAWN + 1
+        if element not in sizes:
+            open_.add(element)
+            inside = [*element, *(by_id[name] for name in _references(element) if name in by_id)]
+            sizes[element] = 1 + sum(min(size(part), MAX_DRAWN + 1) for part in inside)
+            open_.discard(element)
+        return sizes[element]
+
+    try:
+        too_large = size(root) > MAX_DRAWN
+    except RecursionError:
+        too_large = True
+    return f"draws more than {MAX_DRAWN} parts, or itself" if too_large else None
+
+
+def _references(element):
+    for key, value in element.attrib.items():
+        if _local(key) == "href" and value.strip().startswith("#"):
+            yield value.strip()[1:]
+        yield from _REFERENCE.findall(value)
+
+
+def png_problem(data):
+    """Return the reason why the bytes of a PNG are no valid logo, or None."""
+    if not data.startswith(_PNG) or data[12:16] != b"IHDR" or len(data) < 24:
+        return "is no PNG file"
+    size = struct.unpack(">II", data[16:24])
+    if not all(1 <= side <= MAX_LOGO_PIXELS for side in size):
+        wide, high = size
+        return f"has {wide} x {high} pixels; expected at most {MAX_LOGO_PIXELS} along a side"
+    from matplotlib.image import imread
+
+    try:
+        imread(io.BytesIO(data), format="png")
+    except Exception as error:  # a broken image can raise any exception
+        return f"cannot be read as a PNG ({error})"
+    return None
 
 
 @dataclass(frozen=True)
@@ -115,7 +234,9 @@ def _parsed(path, data, log):
     }
     laboratory = sections["laboratory"]
     given = settings.get("laboratory", {})
-    logo, mark = (_logo(path, laboratory, given, log, key) for key in ("logo", "accreditation"))
+    logo, mark = (
+        _read_logo(path, laboratory, given, log, key) for key in ("logo", "accreditation")
+    )
     if log.problems:
         return None
     if mark is None and laboratory["accreditation_place"]:
@@ -159,7 +280,7 @@ def contrast_with_white(colour):
     return 1.05 / (sum(w * s for w, s in zip(weights, linear, strict=True)) + 0.05)
 
 
-def _logo(path, laboratory, given, log, which):
+def _read_logo(path, laboratory, given, log, which):
     """Return the checked logo or accreditation mark of the laboratory, or None."""
     key = which if which == "logo" else f"{which}_mark"
     name = laboratory[key]
@@ -228,11 +349,11 @@ def data_problem(data):
     if isinstance(mark, str):
         problems.append(None if mark == PLACE else f"its mark is {mark!r}, expected {PLACE!r}")
     else:
-        problems.append(_logo_problem(mark))
-    return next(filter(None, [*problems, _logo_problem(data["logo"])]), None)
+        problems.append(_saved_logo_problem(mark))
+    return next(filter(None, [*problems, _saved_logo_problem(data["logo"])]), None)
 
 
-def _logo_problem(logo):
+def _saved_logo_problem(logo):
     if logo is None:
         return None
     if not _has_shape(logo, dict.fromkeys(("kind", "content", "alt"), str)):

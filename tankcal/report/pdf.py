@@ -22,8 +22,8 @@ from tankcal.memory import return_freed_memory
 from tankcal.messages import printable
 from tankcal.report import attachments
 from tankcal.report.blocks import WEB_ONLY
+from tankcal.report.pdf_objects import with_signature_field
 from tankcal.report.plain_formulas import formula_nodes
-from tankcal.report.signature_field import with_signature_field
 from tankcal.text.shipped import shipped_folder
 
 STANDARDS = ["a-3a", "ua-1"]  # archival PDF/A-3a and accessible PDF/UA-1

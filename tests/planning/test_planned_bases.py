@@ -17,7 +17,7 @@ from tankcal.planning import load_plan, predict
 from tankcal.planning.changes import changes_of, cost_of
 from tankcal.planning.improvements import what_helps, what_would_do
 from tankcal.planning.measurements import draw_measurements
-from tankcal.report.planning import empty_job, workbook
+from tankcal.report.planning import empty_job, files
 from tankcal.report.planning.field_sheets import sheets
 from tankcal.report.planning.outlook import outlook
 from tankcal.report.planning.paper import PlanPaper
@@ -234,7 +234,7 @@ def test_papers_of_a_base(prediction, tmp_path, language):
     assert paper.words["captions"]["bases"] in text
     assert "bar 1" in text
     assert paper.words["labels"]["bases"] in str([one.data for one in outlook(paper)])
-    workbook.write(paper, tmp_path / "sheets.xlsx")
+    files.write_sheets(paper, tmp_path / "sheets.xlsx")
     sheet = openpyxl.load_workbook(tmp_path / "sheets.xlsx")[
         paper.words["workbook"]["sheets"]["bases"]
     ]

@@ -19,8 +19,8 @@ from tankcal.planning.simulations import simulate
 from tankcal.report import planning as planning_papers
 from tankcal.report.numbers import UNITS
 from tankcal.report.pdf import pdf
+from tankcal.report.planning import files, rows
 from tankcal.report.planning import paper as papers
-from tankcal.report.planning import rows, workbook
 from tankcal.report.planning.field_sheets import sheets
 from tankcal.report.planning.outlook import outlook
 from tankcal.report.planning.paper import PlanPaper
@@ -225,7 +225,7 @@ def papers_of(found, language=None, **more):
 
 
 def book_of(found, path, language=None):
-    workbook.write(PlanPaper(found, language), path)
+    files.write_sheets(PlanPaper(found, language), path)
     book = openpyxl.load_workbook(path)
     return [str(cell.value) for sheet in book for row in sheet for cell in row if cell.value] + [
         *book.sheetnames, *(book[name].oddFooter.right.text for name in book.sheetnames)

@@ -14,7 +14,7 @@ from tankcal.planning import load_plan, predict
 from tankcal.planning.improvements import what_helps
 from tankcal.planning.model import Pillar, Tie
 from tankcal.planning.places import full_turn, place_of
-from tankcal.report.planning import figures, files, rows, sketches, workbook
+from tankcal.report.planning import figures, files, rows, sketches
 from tankcal.report.planning.field_sheets import sheets
 from tankcal.report.planning.outlook import outlook
 from tankcal.report.planning.paper import PlanPaper
@@ -206,7 +206,7 @@ def test_additions_have_a_place(prediction, effects, tmp_path):
     assert place["height_m"] == pytest.approx(0.05 * 9.5)
     paper = PlanPaper(prediction, effects=effects)
     assert paper.describe_change(tape) == "additional vertical tape of 8.6\N{NO-BREAK SPACE}m, N-V1"
-    files.write(paper, tmp_path, [])
+    files.write_files(paper, tmp_path, [])
     with open(tmp_path / "changes.csv", encoding="utf-8") as file:
         listed = {row["name"]: row for row in csv.DictReader(file) if row["action"] == "add"}
     assert float(listed["N-V1"]["arc_m"]) == pytest.approx(east_of_weld, abs=1e-3)
@@ -254,7 +254,7 @@ def test_effect_of_uncontrolled_error(tmp_path):
 
 @pytest.mark.slow
 def test_every_printed_page_has_its_headings(hidden, tmp_path):
-    workbook.write(PlanPaper(hidden), tmp_path / "x.xlsx")
+    files.write_sheets(PlanPaper(hidden), tmp_path / "x.xlsx")
     book = openpyxl.load_workbook(tmp_path / "x.xlsx")
     assert book.sheetnames[:3] == ["Sketches", "Targets", "Marks"]
     for sheet in book.worksheets[1:-1]:

@@ -38,7 +38,7 @@ from tankcal.planning.wall.nominal_readings import expect_amplitudes, set_nomina
 from tankcal.planning.wall.prediction import predict_wall_table
 from tankcal.planning.wall.reading import change_plan, tables_of
 from tankcal.record.plan import WALL_PLAN, plain_of_wall
-from tankcal.report.planning import empty_job, figures, workbook
+from tankcal.report.planning import empty_job, figures, files
 from tankcal.report.planning.empty_job import form_of_wall
 from tankcal.report.planning.wall_paper import WallPaper, wall_outlook, wall_sheets
 from tankcal.report.planning.wall_rows import field_tables_of_wall
@@ -579,7 +579,7 @@ SHEETS = {  # of a plan: sheets of its workbook, and how many rows they have
 @pytest.mark.parametrize("folder", SHEETS, ids=lambda one: one.name)
 def test_field_sheets_as_a_workbook(folder, tmp_path):
     """A sheet for each table of the paper, a row for each reading."""
-    workbook.write_wall(WallPaper(predict(load_plan(folder)), "en"), tmp_path / "x.xlsx")
+    files.write_wall_sheets(WallPaper(predict(load_plan(folder)), "en"), tmp_path / "x.xlsx")
     book = openpyxl.load_workbook(tmp_path / "x.xlsx")
     for name, rows in SHEETS[folder].items():
         (table,) = book[name].tables.values()
@@ -593,7 +593,7 @@ def test_field_sheets_as_a_workbook(folder, tmp_path):
 def test_a_workbook_of_the_same_plan_has_the_same_bytes(tmp_path):
     paper = WallPaper(predict(load_plan(HITS)), "pt-BR")
     for name in ("one.xlsx", "two.xlsx"):
-        workbook.write_wall(paper, tmp_path / name)
+        files.write_wall_sheets(paper, tmp_path / name)
     assert (tmp_path / "one.xlsx").read_bytes() == (tmp_path / "two.xlsx").read_bytes()
 
 

@@ -12,8 +12,7 @@ from paper_pages import lone_headings, pages_of, sparse_pages
 from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.report.history import HistoryPaper, rebuild, write_history
-from tankcal.report.history.figures import limited_checks
-from tankcal.report.history.pages import MOST_ROWS, pages
+from tankcal.report.history.pages import MOST_ROWS, limited_checks, pages
 from tankcal.report.history.tables import check_rows, radius_rows, volume_rows
 from tankcal.report.verification import verify
 from tankcal.text.shipped import DEFAULT, LANGUAGES

@@ -27,9 +27,9 @@ from tankcal.report.inspection import (
     rebuild,
     tables,
     wall,
-    workbook,
     write_inspection,
 )
+from tankcal.report.inspection import pages as report_pages
 from tankcal.report.inspection import paper as papers
 from tankcal.report.inspection.bottom import edges, points, settlement_blocks
 from tankcal.report.inspection.pages import (
@@ -415,7 +415,7 @@ def test_a_pdf_is_archival_and_holds_what_it_was_made_from(written):
 
 def test_a_workbook_has_numbers_as_numbers(tmp_path):
     found = plain()
-    workbook.write(InspectionPaper(found, "pt-BR"), tmp_path / "i.xlsx")
+    report_pages.write_sheets(InspectionPaper(found, "pt-BR"), tmp_path / "i.xlsx")
     book = openpyxl.load_workbook(tmp_path / "i.xlsx")
     assert book.sheetnames == ["Verificações", "Verticalidade", "Circularidade", "Soldas",
                                "Recalque", "Borda"]  # fmt: skip
@@ -440,7 +440,7 @@ def test_a_workbook_says_the_warnings_and_prints_headings_again(tmp_path):
     flat = found["gaps"][0] | {"kind": "banding", "gap_mm": None, "U_mm": None, "azimuth_deg": 0.0}
     found["gaps"] = [*found["gaps"], flat]
     paper = InspectionPaper(found)
-    workbook.write(paper, tmp_path / "i.xlsx")
+    report_pages.write_sheets(paper, tmp_path / "i.xlsx")
     book = openpyxl.load_workbook(tmp_path / "i.xlsx")
     checks_ = [row[0] for row in book["Checks"].iter_rows(values_only=True)]
     assert paper.warning(found["warnings"][0]) in checks_
@@ -454,7 +454,7 @@ def test_a_workbook_says_the_warnings_and_prints_headings_again(tmp_path):
 
 
 def test_no_text_of_a_user_is_a_formula(tmp_path):
-    workbook.write(InspectionPaper(hostile()), tmp_path / "i.xlsx")
+    report_pages.write_sheets(InspectionPaper(hostile()), tmp_path / "i.xlsx")
     cells = [c for s in openpyxl.load_workbook(tmp_path / "i.xlsx") for row in s for c in row]
     assert [cell.value for cell in cells if cell.data_type == "f"] == []
     assert any(str(cell.value).startswith("=1+1 $x$") for cell in cells)
@@ -462,7 +462,7 @@ def test_no_text_of_a_user_is_a_formula(tmp_path):
 
 
 def test_a_workbook_of_little_has_no_empty_sheets(tmp_path):
-    workbook.write(InspectionPaper(unjudged()), tmp_path / "i.xlsx")
+    report_pages.write_sheets(InspectionPaper(unjudged()), tmp_path / "i.xlsx")
     assert openpyxl.load_workbook(tmp_path / "i.xlsx").sheetnames == ["Checks", "Settlement"]
 
 
@@ -501,7 +501,7 @@ def test_a_failure_leaves_earlier_results(tmp_path, monkeypatch):
     def fails(paper, path):
         raise OSError("no room")
 
-    monkeypatch.setattr(workbook, "write", fails)
+    monkeypatch.setattr(report_pages, "write_sheets", fails)
     with pytest.raises(OSError, match="no room"):
         write_inspection(plain(), tmp_path / "i")
     assert [path.name for path in tmp_path.iterdir()] == ["i"]

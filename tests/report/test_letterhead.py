@@ -17,8 +17,15 @@ from test_report import pages
 from tankcal.errors import InputError, TankcalError
 from tankcal.report import blocks
 from tankcal.report.document import blocks_of
-from tankcal.report.letterhead import LETTERHEAD_FILE, contrast_with_white, load, read_saved
-from tankcal.report.logo import MAX_LOGO_BYTES, png_problem, svg_problem
+from tankcal.report.letterhead import (
+    LETTERHEAD_FILE,
+    MAX_LOGO_BYTES,
+    contrast_with_white,
+    load,
+    png_problem,
+    read_saved,
+    svg_problem,
+)
 from tankcal.report.papers import build
 from tankcal.report.pdf import pdf
 

@@ -16,7 +16,7 @@ from tankcal.products.quantity.table import read_table
 from tankcal.report import blocks
 from tankcal.report.paper import Paper
 from tankcal.report.web import page
-from tankcal.report.web.capacity_data import calculator
+from tankcal.report.web.calculator_data import calculator
 from tankcal.tank.gauging import UNCERTAINTIES
 from tankcal.text.shipped import shipped_folder
 from tankcal.text.words import load_words

@@ -8,7 +8,7 @@ from paper_cells import paper_blocks
 
 from tankcal.report import blocks
 from tankcal.report.pdf import pdf
-from tankcal.report.signature_field import LINK, NAME, with_signature_field
+from tankcal.report.pdf_objects import FIELD_NAME, SIGNATURE_LINK, with_signature_field
 
 pypdf = pytest.importorskip("pypdf")
 DIGEST = "0123456789abcdef" * 4
@@ -31,7 +31,7 @@ def test_the_field_is_one_unsigned_signature_in_the_tree_of_tags(signed_here):
     root = reader.trailer["/Root"]
     (field,) = root["/AcroForm"]["/Fields"]
     widget = field.get_object()
-    assert (widget["/FT"], widget["/T"], widget["/Subtype"]) == ("/Sig", NAME, "/Widget")
+    assert (widget["/FT"], widget["/T"], widget["/Subtype"]) == ("/Sig", FIELD_NAME, "/Widget")
     assert widget["/TU"] == "Campo para assinatura — é ção"
     assert not {"/V", "/A", "/AA"} & set(widget)
     assert field in reader.pages[0]["/Annots"]
@@ -80,13 +80,13 @@ def test_the_same_page_gives_the_same_bytes(signed_here):
 @pytest.mark.slow
 def test_no_field_where_none_is_asked_for():
     made = page_of(blocks.signature(["a", "b"]))
-    assert LINK not in made
+    assert SIGNATURE_LINK not in made
     assert b"/AcroForm" not in made
 
 
 @pytest.mark.parametrize("spoilt", ["", "%PDF-1.7 nothing", "startxref\n9\n%%EOF", "xref"])
 def test_a_file_of_another_form_stays_as_it_is(spoilt):
-    content = LINK + spoilt.encode()
+    content = SIGNATURE_LINK + spoilt.encode()
     assert with_signature_field(content, "x") == content
 
 
@@ -94,7 +94,7 @@ def test_a_file_of_another_form_stays_as_it_is(spoilt):
 def test_every_certificate_has_one_field_and_says_its_record(example_run):
     for name in ("certificate.pdf", "report.pdf"):
         reader = pypdf.PdfReader(example_run / "results" / name)
-        assert list(reader.get_fields()) == [NAME]
+        assert list(reader.get_fields()) == [FIELD_NAME]
 
 
 def test_the_code_says_the_hash(monkeypatch):

@@ -192,7 +192,7 @@ def test_the_critical_zone_of_a_roof_is_refused(browser, example_record, record,
 def test_numbers_are_in_the_marks_of_the_language(browser, example_record, record, tmp_path):
     words = words_with(PORTUGUESE)
     with pytest.MonkeyPatch.context() as patch:
-        for module in ("tankcal.report.paper", "tankcal.report.web.offline"):
+        for module in ("tankcal.report.paper", "tankcal.report.web"):
             patch.setattr(f"{module}.load_words", lambda language: words)
         browser.open(written(paper_blocks(example_record), tmp_path))
     browser.type("#dip", "9.41")

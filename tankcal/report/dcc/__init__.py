@@ -1,19 +1,41 @@
 """The digital calibration certificate: XML of the German metrology institute (PTB), schema 3.3.0.
 
 The certificate contains data of the record only. Elements that the schema requires and the job
-lacks are "not stated" (docs/certificate-digital.md).
+lacks are "not stated" (docs/certificate-digital.md). This module writes the element
+measurementResults: methods, conditions, results, provenance.
 """
 
-from tankcal.report.dcc.administrative import add_administrative_data
+from tankcal.report.certificate import instruments_of
+from tankcal.report.dcc.administrative import (
+    add_administrative_data,
+    add_identification,
+    add_software,
+)
 from tankcal.report.dcc.elements import (
+    CELSIUS,
     CERTIFICATE,
+    CUBIC_METRE,
     DCC,
+    DEGREE,
+    DENSITY,
+    KILOGRAM,
+    METRE,
+    ONE,
+    PER_KELVIN,
+    SQUARE_METRE,
     Translations,
     add_child,
+    add_real,
+    add_real_list,
+    add_text,
+    add_uncertainty,
+    add_words,
+    clean,
     make_root,
     serialize,
 )
-from tankcal.report.dcc.measured import add_results
+from tankcal.report.tables import overrulings
+from tankcal.report.uncertainty.stated import k_of_rows, stated_U_m3
 from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import language_of, load_words
 
@@ -24,6 +46,17 @@ _GROUPS = (  # groups of words for a record without survey, warning or decision
     *("choices", "inputs", "kinds", "sides", "zeros", "parts", "units", "yes_no"),
     *("rule_codes", "rule_texts", "formulas", "datum"),
 )
+_UNITS = {  # {printed unit: unit of the value}; values are in SI, angles in degrees
+    "m": METRE,
+    "mm": METRE,
+    "mm/m": ONE,
+    "deg": DEGREE,
+    "m3": CUBIC_METRE,
+    "kg": KILOGRAM,
+    "kg/m3": DENSITY,
+    "": ONE,
+}
+_PUBLISHERS = ("ISO", "IEC", "OIML", "API", "EN", "ABNT", "JCGM")
 
 
 def certificate_xml(record, digest, language=None):
@@ -60,3 +93,235 @@ def certificate_xml(record, digest, language=None):
 def language_with(code):
     """Return the language of LANGUAGES with a two-letter code of the certificate, or None."""
     return next((language for language in LANGUAGES if language.split("-")[0] == code), None)
+
+
+def add_results(parent, languages, digest):
+    """Fill the element with one calibration, whose first result is the table."""
+    element = add_child(parent, "measurementResult", refType="tankcal_calibration")
+    add_text(element, "name", languages.word("titles.certificate"))
+    _methods(add_child(element, "usedMethods"), languages)
+    _software(add_child(element, "usedSoftware"), languages.record)
+    used = instruments_of(languages.record)
+    if used:
+        _equipment(add_child(element, "measuringEquipments"), languages, used)
+    _conditions(add_child(element, "influenceConditions"), languages)
+    _results(add_child(element, "results"), languages)
+    _meta_data(add_child(element, "measurementMetaData"), languages, digest)
+
+
+def _methods(parent, languages):
+    """Add the method of the job with the standards of its corrections, and the method of U."""
+    record = languages.record
+    method = add_child(parent, "usedMethod", refType="tankcal_method")
+    add_text(method, "name", languages.label("method"))
+    names = (clean(languages.job["certificate"].get(key)) for key in ("method", "procedure"))
+    add_text(method, "description", languages.or_not_stated("; ".join(filter(None, names))))
+    for source in _sources(record):
+        is_norm = source.split()[0] in _PUBLISHERS
+        add_child(method, "norm" if is_norm else "reference", source)
+    uncertain = add_child(parent, "usedMethod", refType="basic_methodMeasurementUncertainty")
+    add_text(uncertain, "name", languages.word("headings.uncertainty"))
+    add_child(uncertain, "norm", "JCGM 100:2008")
+    if record.get("monte_carlo"):
+        add_child(uncertain, "norm", "JCGM 101:2008")
+
+
+def _sources(record):
+    """Return the different sources of the applied corrections, standards first."""
+    sources = [
+        correction["source"]
+        for correction in record["corrections"]
+        if correction["applied"] and correction["source"]
+    ]
+    parts = dict.fromkeys(clean(part) for source in sources for part in source.split(";"))
+    return sorted(filter(None, parts), key=lambda part: part.split()[0] not in _PUBLISHERS)
+
+
+def _software(parent, record):
+    add_software(parent, "tankcal", record["tankcal"], "application")
+    for name, release in record["versions"].items():
+        add_software(parent, name, release, "library")
+
+
+def _equipment(parent, languages, used):
+    for name, certificate in used.items():
+        element = add_child(parent, "measuringEquipment", refType="tankcal_instrument")
+        add_text(element, "name", name)
+        if clean(certificate):
+            identified = add_child(element, "identifications")
+            names = languages.word("dcc.certificate_of_instrument")
+            add_identification(identified, clean(certificate), names, "tankcal_certificate")
+
+
+def _conditions(parent, languages):
+    """Add the reference conditions of the table and the conditions of the survey."""
+    table, survey = languages.job["table"], languages.job["survey"]
+    conditions = {
+        "reference_temperature": (table["reference_temperature_c"], CELSIUS),
+        "table_density": (table["liquid_density_kg_m3"] or None, DENSITY),
+        "shell_temperature": (survey["shell_temperature_c"], CELSIUS),
+        "liquid_level": (survey["liquid_level_m"], METRE),
+        "liquid_density": (survey["liquid_density_kg_m3"], DENSITY),
+        "expansion": (languages.job["material"]["expansion_per_k"], PER_KELVIN),
+    }
+    for key, (value, unit) in conditions.items():
+        if value is not None:
+            _condition(parent, languages, key, value, unit)
+
+
+def _condition(parent, languages, key, value, unit):
+    element = add_child(parent, "influenceCondition", refType=f"tankcal_{key}")
+    add_text(element, "name", languages.label(key))
+    add_real(add_child(element, "data"), key, value, unit, languages.label(key))
+
+
+# ---- results
+
+
+def _results(parent, languages):
+    """Add the table, the courses, the parts of the tank, and deadwood."""
+    _capacity(_result(parent, "capacity", languages.word("headings.capacity")), languages)
+    record = languages.record
+    if record["courses"]:
+        of = _result(parent, "courses", languages.word("headings.courses"))
+        for course in record["courses"]:
+            _course(of, languages, course)
+    for name in ("solid", "bottom", "top", "roof"):
+        if record.get(name):
+            _part(parent, languages, name)
+    if record["deadwood"]:
+        of = _result(parent, "deadwood", languages.word("captions.deadwood"))
+        for thing in record["deadwood"]:
+            _thing(of, languages, thing)
+
+
+def _result(parent, name, names):
+    """Add a result, and return the element of its data."""
+    element = add_child(parent, "result", refType=f"tankcal_{name}Result")
+    add_text(element, "name", names)
+    return add_child(element, "data")
+
+
+def _capacity(parent, languages):
+    """Add the table: dips, volumes with the uncertainty of each row, and rows for use."""
+    capacity, job = languages.record["capacity"], languages.job
+    table = add_child(parent, "list", refType="tankcal_table")
+    add_text(table, "name", languages.word("headings.capacity"))
+    text = languages.each(lambda paper: _table_description(paper, capacity))
+    add_text(table, "description", text)
+    add_real_list(table, "dip", capacity["height_m"], METRE, languages.word("dcc.dip"))
+    names = languages.word("dcc.volume")
+    numbers = add_real_list(
+        table, "volume", capacity["volume_m3"], CUBIC_METRE, names, kind="basic_measuredValue"
+    )
+    stated, factors = stated_U_m3(capacity), k_of_rows(capacity)
+    probability = job["table"]["coverage_probability"]
+    if any(stated) and not add_uncertainty(numbers, stated, factors, capacity, probability):
+        U, k = languages.word("dcc.U"), languages.word("dcc.k")
+        add_real_list(table, "expandedUncertainty", stated, CUBIC_METRE, U)
+        add_real_list(table, "coverageFactor", factors, ONE, k)
+    if not all(capacity["for_use"]):
+        use = ["yes" if is_for_use else "no" for is_for_use in capacity["for_use"]]
+        add_words(table, "forUse", use, languages.word("dcc.for_use"))
+    for volumes in languages.record["densities"]:
+        names = languages.each(_density_writer(volumes["density_kg_m3"]))
+        add_real_list(table, "volumeOfDensity", volumes["volume_m3"], CUBIC_METRE, names)
+
+
+def _density_writer(value):
+    """Return a function of a paper: caption of the volumes for another density of the liquid."""
+    return lambda paper: paper.word(
+        "captions.capacity_density", density=paper.number(value, "kg/m3", digits=4)
+    )
+
+
+def _table_description(paper, capacity):
+    """Return sentences on the zero of the heights and on interpolation between rows."""
+    zero = f"{paper.label('zero')}: {paper.word('zeros.' + capacity['zero'])}"
+    return " ".join([f"{zero}.", *paper.choices("interpolation")])
+
+
+def _course(parent, languages, course):
+    element = add_child(parent, "list", refType="tankcal_course")
+    add_text(element, "name", languages.word("dcc.course", name=course["course"]))
+    for key, unit, u in (
+        ("bottom_m", METRE, None),
+        ("top_m", METRE, None),
+        ("thickness_m", METRE, None),
+        ("radius_m", METRE, "radius_sd_m"),
+        ("inside_radius_m", METRE, None),
+        ("area_m2", SQUARE_METRE, "area_sd_m2"),
+        ("volume_m3", CUBIC_METRE, "u_m3"),
+    ):
+        name = key.rpartition("_")[0]
+        names = languages.word(f"dcc.course_{name}")
+        add_real(element, name, course[key], unit, names, course[u] if u else None)
+
+
+def _part(parent, languages, name):
+    """Add a part of the tank: sizes as numbers, and a description of all its details."""
+    heading = "dimensions" if name == "solid" else "inside"
+    element = add_child(parent, "result", refType=f"tankcal_{name}Result")
+    add_text(element, "name", languages.word(f"headings.{heading}"))
+    details = languages.record[name]
+    add_text(element, "description", languages.each(lambda paper: _details_text(paper, details)))
+    data = add_child(element, "data")
+    sizes = [detail for detail in details if detail["unit"] in _UNITS]
+    for size in sizes:
+        code, unit = size["code"], _UNITS[size["unit"]]
+        add_real(data, code, size["value"], unit, languages.label(code))
+    if not sizes:
+        add_text(data, "text", languages.each(lambda paper: _details_text(paper, details)))
+
+
+def _details_text(paper, details):
+    return "; ".join(
+        f"{paper.label(detail['code'])}: {paper.size_text(detail)}" for detail in details
+    )
+
+
+def _thing(parent, languages, thing):
+    element = add_child(parent, "list", refType="tankcal_thing")
+    add_text(element, "name", thing["name"])
+    add_real(element, "bottom", thing["bottom_m"], METRE, languages.word("dcc.course_bottom"))
+    add_real(element, "top", thing["top_m"], METRE, languages.word("dcc.course_top"))
+    names = languages.word("dcc.volume_of_thing")
+    add_real(element, "volume", thing["volume_m3"], CUBIC_METRE, names, thing["u_m3"])
+
+
+# ---- provenance
+
+
+def _meta_data(parent, languages, digest):
+    """Add the record and its input files with their hashes, and the sentences of the report."""
+    record_file = {"file": "record.json", "sha256": digest}
+    _file(parent, languages.word("dcc.record"), record_file, "tankcal_record")
+    for file in languages.record["files"]:
+        _file(parent, languages.word("dcc.input_file"), file, "tankcal_inputFile")
+    choices = languages.each(lambda paper: " ".join(paper.choices()))
+    _declaration(parent, languages.word("headings.choices"), choices, "tankcal_assumptions")
+    for i in range(len(overrulings.decisions_of(languages.record))):
+        sentence = languages.each(lambda paper, i=i: overrulings.sentences(paper)[i])
+        _declaration(parent, languages.word("headings.overrulings"), sentence, "tankcal_overruling")
+    for i in range(len(languages.record["warnings"])):
+        text = languages.each(lambda paper, i=i: _warning_text(paper.record["warnings"][i]))
+        _declaration(parent, languages.word("headings.warnings"), text, "tankcal_warning")
+
+
+def _file(parent, names, file, kind):
+    """Add a file with its name; `reference` contains only its SHA-256."""
+    element = add_child(parent, "metaData", refType=kind)
+    add_text(element, "name", names)
+    add_text(element, "description", file["file"])
+    add_child(element, "reference", f"sha256:{file['sha256']}")
+
+
+def _declaration(parent, names, declaration, kind):
+    element = add_child(parent, "metaData", refType=kind)
+    add_text(element, "name", names)
+    add_text(element, "declaration", declaration)
+
+
+def _warning_text(warning):
+    place = ", ".join(part for part in (warning["file"], warning["column"]) if part)
+    return f"{place}: {warning['text']}"

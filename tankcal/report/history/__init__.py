@@ -78,10 +78,9 @@ class HistoryPaper(SavedPaper):
 
 
 def _load_renderers():
-    from tankcal.report.history.pages import pages
-    from tankcal.report.history.workbook import write
+    from tankcal.report.history.pages import pages, write_sheets
 
-    return pages, write
+    return pages, write_sheets
 
 
 DOCUMENT = SavedDocument(

@@ -16,10 +16,9 @@ __all__ = [
 
 
 def _load_renderers():
-    from tankcal.report.inspection.pages import pages
-    from tankcal.report.inspection.workbook import write
+    from tankcal.report.inspection.pages import pages, write_sheets
 
-    return pages, write
+    return pages, write_sheets
 
 
 DOCUMENT = SavedDocument(

@@ -87,15 +87,15 @@ def _paper_class(prediction):
 
 def _write(paper, folder, progress, as_workbook):
     """Write the files of a PlanPaper or WallPaper."""
-    from tankcal.report.planning import empty_job, files, workbook
+    from tankcal.report.planning import empty_job, files
     from tankcal.report.planning.field_sheets import sheets
     from tankcal.report.planning.outlook import outlook
     from tankcal.report.planning.wall_paper import wall_outlook, wall_sheets
 
-    write_job, write_tables, write_book = empty_job.write, files.write, workbook.write
+    write_job, write_tables, write_book = empty_job.write, files.write_files, files.write_sheets
     if paper.is_wall:
         write_job = empty_job.write_wall
-        write_tables, write_book = files.write_wall, workbook.write_wall
+        write_tables, write_book = files.write_wall_files, files.write_wall_sheets
         outlook, sheets = wall_outlook, wall_sheets
     progress(WRITING_JOB)
     write_job(paper.prediction, folder / JOB, as_workbook)

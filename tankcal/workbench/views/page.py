@@ -11,7 +11,7 @@ from tankcal.report.tables import overrulings
 from tankcal.report.tables import tank as tables
 from tankcal.report.uncertainty import budget, capacity
 from tankcal.report.web import page
-from tankcal.report.web.capacity_data import calculator
+from tankcal.report.web.calculator_data import calculator
 from tankcal.report.web.tank_shape import tank_view
 from tankcal.report.web.wall_map import wall_map_view
 
