@@ -11,7 +11,13 @@ from tankcal.messages import message
 from tankcal.survey.datum import make_frame
 from tankcal.survey.depth import adjust_in_depth
 from tankcal.survey.diagnosis.blunders import find_swapped_control, gross_readings, search_blunders
-from tankcal.survey.diagnosis.checks import check_points, check_readings, find_disagreeing_checks
+from tankcal.survey.diagnosis.checks import (
+    check_points,
+    check_readings,
+    check_readings_off,
+    find_disagreeing_checks,
+    scale_of_control,
+)
 from tankcal.survey.diagnosis.diagnoses import MIRROR, diagnose
 from tankcal.survey.diagnosis.double_names import names_alike, same_place
 from tankcal.survey.diagnosis.fixed_datum_check import (
@@ -26,7 +32,6 @@ from tankcal.survey.diagnosis.outlier_attribution import (
     find_one_sided_losses,
     find_undecided_outliers,
 )
-from tankcal.survey.diagnosis.scales import check_readings_off, scale_of_control
 from tankcal.survey.network.adjustment import find_hardly_determined
 from tankcal.survey.network.reactions import reactions
 from tankcal.survey.network.survey import IMAGES

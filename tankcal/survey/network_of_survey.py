@@ -13,7 +13,7 @@ from tankcal.survey.diagnosis.undetermined import (
     find_untouched_coordinates,
     unmeasured_sentence,
 )
-from tankcal.survey.means import average_repeated
+from tankcal.survey.means import average_repeated, reject_scattered
 from tankcal.survey.network import Instrument, Survey, System
 from tankcal.survey.observations import (
     KINDS,
@@ -24,7 +24,6 @@ from tankcal.survey.observations import (
 )
 from tankcal.survey.photographs import gathered_photos, orientation_of
 from tankcal.survey.readings import Numbers, bend_per_m, observations_of_readings
-from tankcal.survey.repeated_readings import reject_scattered
 
 AXES = "xyz"
 TOLD = 10  # warnings listed singly; further omitted points are only counted

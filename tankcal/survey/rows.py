@@ -27,8 +27,9 @@ def readings_of(adjusted, held, held_trace):
     parts_of_readings, groups = [], {}
     for number, table in enumerate((*adjusted.residuals, held)):
         if table.source == "known beforehand":
-            trace = _known_trace(adjusted, adjusted.problem.observations[number])
-            value = adjusted.problem.observations[number].value
+            known_unknowns = adjusted.problem.observations[number]
+            trace = _KnownTrace(*_known_names(adjusted, known_unknowns))
+            value = known_unknowns.value
         else:
             trace, value = _trace_and_values(adjusted.survey, table, held_trace)
         if not len(table.rows):
@@ -140,16 +141,10 @@ def _units(table, trace):
 class _KnownTrace:
     """A Trace of weighted unknowns, which have no row in a file and a unit each."""
 
-    def __init__(self, file, ids, elements, units):
+    def __init__(self, ids, elements, units, file):
         self.file, self.ids, self.element = file, ids, [(element,) for element in elements]
         self.rows, self.repeats, self.units = [None] * len(ids), [1] * len(ids), units
         self.group = [names[0] for names in ids]
-
-
-def _known_trace(adjusted, known_unknowns):
-    """The _KnownTrace of weighted unknowns."""
-    names, elements, units, file = _known_names(adjusted, known_unknowns)
-    return _KnownTrace(file, names, elements, units)
 
 
 def _known_names(adjusted, known_unknowns):

@@ -27,7 +27,7 @@ from tankcal.pipeline.solids.scan import fit_scan
 from tankcal.record import record_of
 from tankcal.report import certificate
 from tankcal.report.paper import Paper
-from tankcal.survey.diagnosis.scales import check_readings_off, scale_of_control
+from tankcal.survey.diagnosis.checks import check_readings_off, scale_of_control
 from tankcal.survey.measurements import Setup
 from tankcal.survey.results import Reading, Readings
 from tankcal.text.shipped import shipped_folder

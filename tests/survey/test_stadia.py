@@ -11,7 +11,7 @@ from job_builder import tangent_parts, write_book, write_folder
 
 import tankcal
 from tankcal.errors import InputError
-from tankcal.job.checks.ranging import ranging_of
+from tankcal.methods.hits.checks import ranging_of
 from tankcal.methods.lines.checks import plummets_of
 from tankcal.pipeline.checks.stadia import check_bases
 

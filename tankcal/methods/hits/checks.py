@@ -4,16 +4,16 @@ import numpy as np
 
 from tankcal.job.checking import has_rows, refuse_repeated, tell_missing
 from tankcal.job.checks.extent import has_survey, tells_by_tape
-from tankcal.job.checks.ranging import instruments_used, ranging_of
 from tankcal.job.checks.survey.files import SurveyFiles, refuse_undefined
 from tankcal.job.checks.survey.instruments import check_correction
 from tankcal.job.checks.survey.readings import check_angle, warn_copies
-from tankcal.job.checks.tapes import refuse_others
+from tankcal.job.checks.tapes import refuse_others, tapes_of
 from tankcal.job.contract.registers import FREE
 from tankcal.messages import message
 from tankcal.survey.wall_hits import FEWEST_HITS, MOST_HITS, too_many_hits
 
 RANGES = ("slope_distances", "distances")  # tables by which a network determines an offset
+RANGE_NOTHING = ("plummet", "stadia", "level")  # kinds of instruments without a distance
 
 
 def check_hits(values, tables, registers, raw, log, *, undeclared_offset=None):
@@ -157,3 +157,20 @@ def _told_by_network(files, name):
     used = instruments_used(setups, ranging_of(files.registers))
     by_setup = has_rows(slopes) and any(used.get(setup) == name for setup in slopes.of("setup"))
     return by_setup or (has_rows(distances) and name in distances.of("instrument"))
+
+
+def ranging_of(registers):
+    """{name: {key: value}} of the instruments that measure distances, except tapes."""
+    instruments, tapes = registers["instruments"], tapes_of(registers)
+    return {
+        name: given
+        for name, given in instruments.items()
+        if name not in tapes and (given["kind"] or "").strip().lower() not in RANGE_NOTHING
+    }
+
+
+def instruments_used(setups, ranging):
+    """{set-up: name of its instrument}; a blank means the only instrument, None if several."""
+    only = next(iter(ranging)) if len(ranging) == 1 else None
+    pairs = zip(setups.of("setup"), setups.of("instrument"), strict=True)
+    return {setup: name or only for setup, name in pairs}

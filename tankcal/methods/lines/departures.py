@@ -147,7 +147,9 @@ def check_sign(job, levels):
             sd=sd,
         )
         yield Problem(FILE, text, column="offset_mm")
-    elif slope < HARDLY and slope < 1 - SURE_SDS * sd and not _any_inside(job):
+        return
+    is_any_inside = any(line.inside for line in job.lines.lines.values())
+    if slope < HARDLY and slope < 1 - SURE_SDS * sd and not is_any_inside:
         text = message(
             "lines_of_inside",
             "the wall does not come out with its plates ({slope:+.1f} of their step, sd {sd:.1f};"
@@ -157,8 +159,3 @@ def check_sign(job, levels):
             sd=sd,
         )
         yield Problem("lines.csv", text, column="side")
-
-
-def _any_inside(job):
-    """Whether any line stands inside the tank."""
-    return any(line.inside for line in job.lines.lines.values())

@@ -3,8 +3,7 @@
 from tankcal.job.checks.plausible.levels import check_dates, check_levels
 from tankcal.job.checks.plausible.material import check_material
 from tankcal.job.checks.plausible.plates import check_plates
-from tankcal.job.checks.plausible.sizes import check_rings, check_sizes
-from tankcal.job.checks.plausible.targets import check_targets
+from tankcal.job.checks.plausible.sizes import check_rings, check_sizes, check_targets
 
 __all__ = ["check_plausible"]
 

@@ -1,13 +1,14 @@
-"""Plausibility of dimensions of lying cylinders, spheres and heads, and of rings of points."""
+"""Plausibility of lying cylinders, spheres, heads, rings of points and targets."""
 
 import numpy as np
 
-from tankcal.job.checking import course_heights, places_of, tell
+from tankcal.job.checking import course_heights, has_rows, places_of, tell
 from tankcal.job.plausibility import (
     DISH_RADIUS,
     END_DEPTH,
     ENDS_DIFFER,
     ENDS_DIFFER_M,
+    FLAT,
     HEMISPHERE,
     IMPOSSIBLE_MISS,
     KNUCKLE_RADIUS,
@@ -17,10 +18,12 @@ from tankcal.job.plausibility import (
     MOST_LENGTH_OVER_DIAMETER,
     MOST_RINGS,
     NEAR_JOINT_M,
+    RAISED,
     RING_GAP_M,
     SIZE_MISS,
     SIZE_MISS_M,
     SPHERE_M,
+    TARGET_MM,
     side_doubt,
 )
 from tankcal.messages import message
@@ -241,3 +244,34 @@ def _check_alike(given, sizes, raw, log):
             other_m=min(a, b),
         )
         tell(log.warning, raw, "horizontal", f"end_{end}_{name}", text)
+
+
+def check_targets(values, tables, log):
+    """Warn once about offsets that do not fit the kind of target.
+
+    An offset is subtracted from every radius, and no reading of the survey contradicts it.
+    """
+    table = tables["targets"]
+    if not has_rows(table):
+        return
+    kind = values["checks"]["targets"] or FLAT
+    offset = np.nan_to_num(table.numbers("offset_mm"))
+    least, most = TARGET_MM[kind]
+    outliers = np.flatnonzero((offset < least) | (offset > most))
+    if len(outliers) == 0:
+        return
+    worst = outliers[int(np.argmax(np.abs(offset[outliers])))]
+    text = message(
+        "target_offset_strange",
+        "{found_mm:g} mm from the wall to the centre of the target, {count} targets of {all} so;"
+        " expected {least_mm:g} to {most_mm:g} mm with checks.targets = {kind}: is it in another"
+        " unit or the constant of a prism, or are the targets {other}?",
+        found_mm=float(offset[worst]),
+        count=len(outliers),
+        all=len(offset),
+        least_mm=least,
+        most_mm=most,
+        kind=kind,
+        other=RAISED if kind == FLAT else FLAT,
+    )
+    log.warning(table.file, text, table.rows[worst], "offset_mm")
