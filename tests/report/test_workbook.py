@@ -13,7 +13,7 @@ from xlsxwriter.worksheet import Worksheet
 
 from tankcal.report.workbook import write
 from tankcal.report.workbook.look import Column, _longest_number
-from tankcal.report.workbook.sheet import NumberRow, Sheet
+from tankcal.report.workbook.writer import NumberRow, Sheet
 from tankcal.text.digits import decimals_of
 from tankcal.text.words import choice_sentence, load_words, sentence
 

@@ -44,7 +44,7 @@ def write_scores(scores, out, language=None, progress=None):
     InputError
         If the folder has other files, or if the data are no scores.
     """
-    from tankcal.report.scores.pages import pages
+    from tankcal.report.scores.pages import pages, write_sheets
     from tankcal.report.web import page
 
     refuse_foreign(out)
@@ -54,29 +54,7 @@ def write_scores(scores, out, language=None, progress=None):
     with folders.replace_folder(out) as temporary:
         progress(message("ic_papers", "writing scores, page and workbook"))
         save(paper.saved, temporary / FILE)
-        _write_workbook(paper, temporary / WORKBOOK)
+        write_sheets(paper, temporary / WORKBOOK)
         blocks = [block.data for block in pages(paper)]
         (temporary / PAGE).write_text(page(blocks), encoding="utf-8")
     return [Path(out) / name for name in FILES]
-
-
-def _write_workbook(paper, path):
-    """Write the workbook of a ScoresPaper; equal scores give equal bytes."""
-    from tankcal.report.scores.tables import METHODS_SHEET, PARTICIPANTS, ROWS, TABLES
-    from tankcal.report.workbook.book import workbook_head
-    from tankcal.report.workbook.sections import SheetContent, cell_table, write_workbook
-
-    def sheets(book):
-        for code, table in (
-            ("scored_methods", METHODS_SHEET),
-            ("scored_tables", TABLES),
-            ("scored_rows", ROWS),
-            ("scored_participants", PARTICIPANTS),
-        ):
-            yield SheetContent(code, [cell_table(book, table)], tab="result", is_filtered=True)
-
-    scores = paper.record
-    head = workbook_head(
-        scores["tankcal"], source=paper.subject(), date=paper.date(), notice=scores["notice"]
-    )
-    write_workbook(paper, path, "scores", head, sheets)

@@ -20,8 +20,7 @@ from tankcal.report.workbook.look import (
     lines_of,
     number_format,
 )
-from tankcal.report.workbook.sheet import NumberRow, Sheet
-from tankcal.report.workbook.writer import Writer
+from tankcal.report.workbook.writer import NumberRow, Sheet, Writer
 
 RECORD_PROPERTY = "record.json SHA-256"  # property that `tankcal verify` reads
 _A4 = 9  # Excel's code of the paper size
