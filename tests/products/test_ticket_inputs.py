@@ -250,6 +250,13 @@ def test_a_difference_that_no_slip_explains_is_left(tmp_path):
     assert read_tickets(_cylinder(), inputs).warnings == ()
 
 
+def test_a_copied_dip_is_warned_of():
+    dip = _inputs()["opening"]["dip_m"]
+    (warning,) = read_tickets(_cylinder(), _inputs(closing={"dip_m": dip})).warnings
+    assert warning.column == "closing.dip_m"
+    assert "was it copied" in str(warning.text)
+
+
 def test_a_moved_reference_height_is_told():
     within = _inputs(closing={"reference_height_m": 12.603})
     assert read_tickets(_cylinder(), within).warnings == ()

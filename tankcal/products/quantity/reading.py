@@ -525,10 +525,15 @@ def _refuse_levels(source, state, table, level, by_ullage):
             source.tell_each(key_of(is_ullage), is_critical & (by_ullage == is_ullage),
                              lambda _: text)  # fmt: skip
     water = source.numbers(f"{state}.water_dip_m")
-    text = message(
-        "ticket_water_above", "above the liquid; expected a dip below the dip of the liquid"
-    )
-    source.tell_each(f"{state}.water_dip_m", water >= level, lambda _: text)
+    source.tell_each(
+        f"{state}.water_dip_m",
+        water >= level,
+        lambda ticket: message(
+            "ticket_water_above",
+            "found {water:.4f} m; expected a dip below the liquid at {dip:.4f} m",
+            water=float(water[ticket]), dip=float(level[ticket]),
+        ),
+    )  # fmt: skip
     if table.roof is not None and table.is_roof_in_table:
         bottom = table.roof.critical_bottom_m
         text = message(
@@ -546,8 +551,15 @@ def _product(source, correction, table):
     density = source.numbers("product.density_kg_m3")
     text = message("ticket_no_density", "missing; expected the density of the product")
     source.tell_each("product.density_kg_m3", np.isnan(density), lambda _: text)
-    text = message("ticket_density_unit", "expected kg/m3: is it a relative density, or in g/cm3?")
-    source.tell_each("product.density_kg_m3", density < LEAST_DENSITY, lambda _: text)
+    source.tell_each(
+        "product.density_kg_m3",
+        density < LEAST_DENSITY,
+        lambda ticket: message(
+            "ticket_density_unit",
+            "found {density:g}; expected kg/m³: is it a relative density, or in g/cm³?",
+            density=float(density[ticket]),
+        ),
+    )  # fmt: skip
     sample, glass = None, np.ones(source.count)
     if given["density_is"] == "observed":
         sample = source.numbers("product.density_temperature_c")
@@ -595,6 +607,17 @@ def _warn_of_slips(source, gaugings, product):
     for state, gauging in gaugings.items():
         is_hot = gauging.ambient_c > HOTTEST_AIR_C
         source.tell_each(f"{state}.ambient_c", is_hot, lambda _: air, is_warning=True)
+    if len(gaugings) == 2:
+        opening, closing = (gaugings[state].level_m for state in STATES)
+        source.tell_each(
+            "closing.dip_m",
+            opening == closing,
+            lambda ticket: message(
+                "ticket_equal_dips", "{dip:.4f} m, as in the opening gauging: was it copied?",
+                dip=float(closing[ticket]),
+            ),
+            is_warning=True,
+        )  # fmt: skip
     share = 100 * product.water_share
     fraction = message("ticket_sw_fraction", "less than {limit:g} %: is it a fraction?",
                        limit=LEAST_SW_PERCENT)  # fmt: skip
