@@ -1,8 +1,8 @@
 """Decimal mark of the numbers in a CSV file of a job.
 
 A number such as 12,5 or 0.125 has one meaning. The numbers 1,234 and 1.234 have two meanings: the
-mark may be a decimal mark or separate thousands. The other numbers of the file, or [csv] in
-job.toml, decide.
+mark may be a decimal mark or separate thousands. The bounds of the column, the other numbers of the
+file, or [csv] in the settings decide: a dip of up to 200 m is not 1234 m.
 """
 
 import re
@@ -28,8 +28,10 @@ def has_two_meanings(text):
 def settle_decimal(table, fields, log):
     """Determine the decimal mark of the numbers in a table; None for a table of a workbook.
 
-    The numbers with one meaning decide if they all have the same mark. Otherwise the mark declared
-    in [csv] applies. A number with two meanings that neither decides is one problem for the file.
+    The numbers with one meaning decide if they all have the same mark. Without a declared mark, a
+    number has one meaning if the other is outside the bounds of its column. Otherwise the mark
+    declared in [csv] applies. A number with two meanings that neither decides is one problem for
+    the file.
 
     Parameters
     ----------
@@ -47,11 +49,11 @@ def settle_decimal(table, fields, log):
     if table.decimal is None:
         return None
     places = [
-        (table.headings.index(field.name), field.name)
+        (table.headings.index(field.name), field)
         for field in fields
         if field.kind == "number" and field.name in table.headings
     ]
-    marks = _marks_of(table, [place for place, _ in places])
+    marks = _marks_of(table, places, table.decimal == NOT_KNOWN)
     if len(marks) == 1:
         return marks.pop()
     default = "." if table.decimal == NOT_KNOWN else table.decimal
@@ -80,23 +82,34 @@ def settle_decimal(table, fields, log):
     return "," if "," in text else "."
 
 
-def _marks_of(table, places):
-    """Set of the decimal marks of numbers with one meaning."""
+def _marks_of(table, places, by_bounds):
+    """Set of the decimal marks of numbers with one meaning, also `by_bounds` of their columns."""
     marks = set()
-    for place in places:
+    for place, field in places:
         cells = {row[place] for row in table.rows}
         for mark in {".", ","} - marks:
-            if any(_shows(cell, mark) for cell in cells if cell and mark in cell):
+            present = [cell.strip(" \t") for cell in cells if cell and mark in cell]
+            if any(
+                _shows(text, mark) or (by_bounds and _is_decimal(text, mark, field))
+                for text in present
+            ):
                 marks.add(mark)
     return marks
 
 
-def _shows(cell, mark):
-    """Return True if the cell is a number with one meaning and this decimal mark."""
-    text = cell.strip(" \t")
+def _shows(text, mark):
+    """Return True if the text is a number with one meaning and this decimal mark."""
     if len(text) > MAX_NAME or text.count(",") + text.count(".") != 1 or has_two_meanings(text):
         return False
     return NUMBER.fullmatch(text.replace(mark, ".")) is not None
+
+
+def _is_decimal(text, mark, field):
+    """Return True if the field accepts a number with two meanings as a decimal fraction only."""
+    if not has_two_meanings(text):
+        return False
+    small, large = float(text.replace(mark, ".")), float(text.replace(mark, ""))
+    return field.low <= small <= field.high and not field.low <= large <= field.high
 
 
 def _first_in_doubt(table, places, marks):
@@ -107,8 +120,8 @@ def _first_in_doubt(table, places, marks):
     if marks and table.decimal != NOT_KNOWN:
         return None
     for row, number in zip(table.rows, table.row_numbers, strict=True):
-        for place, name in places:
+        for place, field in places:
             text = (row[place] or "").strip(" \t")
             if has_two_meanings(text) and table.decimal not in text:
-                return text, number, name
+                return text, number, field.name
     return None

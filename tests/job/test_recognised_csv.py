@@ -101,16 +101,25 @@ def test_a_file_against_the_declared_mark_is_refused_in_one_line(tmp_path):
     assert "set [csv] decimal = ',' if it is 1.900" in problem
 
 
-def test_one_number_that_shows_its_mark_decides_for_the_file(tmp_path):
+def test_bounds_of_a_column_decide_without_a_declared_mark(tmp_path):
+    """1,900 is 1.9 m: no course is 1900 m high. A declared point still refuses it (above)."""
     folder = write_folder(tmp_path / "job", job_parts())
     heights = [one.height_m for one in load(folder).courses]
     rows = [f"{i};{h:.3f};8".replace(".", ",") for i, h in enumerate(heights, 1)]
     text = "\n".join(["course;height_m;thickness_mm", *rows]) + "\n"
     (folder / "courses.csv").write_text(text)
-    [problem] = [one for one in problems_of(folder) if ", height_m: found" in one]
-    assert "which is" in problem
-    (folder / "courses.csv").write_text(text.replace("00;", "0;", 1))  # 1,90 in place of 1,900
     assert [one.height_m for one in load(folder).courses] == pytest.approx(heights)
+
+
+def test_one_number_that_shows_its_mark_decides_for_the_file(tmp_path):
+    folder = write_folder(tmp_path / "job", job_parts())
+    rows = [f"P{i};{i + 1},234;{i + 2},345;1,456" for i in range(9)]
+    text = "\n".join(["point;x_m;y_m;z_m", *rows]) + "\n"
+    (folder / "points.csv").write_text(text)
+    [problem] = [one for one in problems_of(folder) if one.startswith("points.csv")]
+    assert "which is" in problem
+    (folder / "points.csv").write_text(text.replace("2,345", "2,34", 1))
+    assert [one for one in problems_of(folder) if one.startswith("points.csv")] == []
 
 
 @pytest.mark.parametrize(

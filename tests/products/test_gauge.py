@@ -414,11 +414,41 @@ def test_no_limit_no_decision(folder):
         ({"gauge": {"scale_ppm": 10}}, "gauge.u_scale_ppm"),
         ({"gauge": {"highest_m": 0.2}}, "not above lowest_m"),
         ({"gauge": {"supported_by": "roof"}}, "supported_by"),
-        ({"gauge": {"record": "missing.json"}}, "not found"),
+        ({"gauge": {"record": "missing.json"}}, "where no record is"),
         ({"zeros": {"dip_plate_m": 1}}, "zeros.table_zero_m"),
         ({"colour": {"a": 1}}, "[colour]"),
         ({"heading": "level,ullage_m,gauge_m"}, "reference.height_m"),
         ({"rows": [("a", "1,5", 1)]}, "readings.csv"),
+        ({"rows": [("a", 1, 1), ("a", 5, 5), ("b", 9, 9)]}, "a are up to 4.000 m apart"),
+        (
+            {"rows": [("a", 12, 1), ("b", 8, 5), ("c", 4, 9)], "reference": {"height_m": 13}},
+            "it agrees as an ullage; move it to the column ullage_m",
+        ),
+        (
+            {
+                "rows": [("a", 1, 1.002), ("b", 5, 5), ("c", 9, 9)],
+                "reference": {"height_m": 13},
+                "heading": "level,ullage_m,gauge_m",
+            },
+            "it agrees as a dip",
+        ),
+        (
+            {
+                "rows": [("a", 1, 24, 1), ("b", 5, 24, 5), ("c", 9, 24, 9)],
+                "heading": "level,dip_m,gauge_m,tape_c",
+            },
+            "are gauge_m and tape_c swapped?",
+        ),
+        (
+            {
+                "rows": [("a", 24, 1, 1), ("b", 24, 5, 5), ("c", 24, 9, 9)],
+                "heading": "level,dip_m,gauge_m,tape_c",
+            },
+            "are the tape reading and tape_c swapped?",
+        ),
+        ({"rows": [("a", 1, 1814), ("b", 5, 5), ("c", 9, 9)]}, "another unit"),
+        ({"gauge": {"record": "missing"}}, "gauge.record: found 'missing', where no record is"),
+        ({"gauge": {"resolution_mm": ""}}, "resolution_mm: blank; expected a number above 0"),
     ],
 )
 def test_bad_input_is_one_line(tmp_path, capsys, changes, expected):
@@ -429,6 +459,21 @@ def test_bad_input_is_one_line(tmp_path, capsys, changes, expected):
     assert expected in error
     assert "Traceback" not in error
     assert not out.exists()
+
+
+def test_semicolons_decimal_commas_and_byte_order_mark_are_read(tmp_path):
+    """As Excel saves a sheet in Brazil; no dip is 1812 m, so that 1,812 has one meaning."""
+    folder = write(tmp_path / "g")
+    expected = computed(folder)["line"]
+    path = folder / "readings.csv"
+    text = path.read_text(encoding="utf-8").replace(",", ";").replace(".", ",")
+    path.write_bytes(text.replace("\n", "\r\n").encode("utf-8-sig"))
+    assert computed(folder)["line"] == expected
+
+
+def test_a_missing_folder_names_the_command_that_creates_it(tmp_path, capsys):
+    assert main(["gauge", str(tmp_path / "tk-1")]) == 2
+    assert "tankcal gauge tk-1 --new" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -427,9 +427,11 @@ def test_tickets_have_different_names(settings, tmp_path):
 
 def test_decimal_mark_can_be_declared(settings, tmp_path):
     rows = tmp_path / "tickets.csv"
-    rows.write_text("ticket;closing_dip_m\nA;8,123\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"\[csv\] decimal"):
+    rows.write_text("ticket;density_kg_m3\nA;1,025\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"\[csv\] decimal"):  # 1.025 or 1025
         read_tickets(_cylinder(), settings(), rows)
+    rows.write_text("ticket;closing_dip_m\nA;8,123\n", encoding="utf-8")
+    assert read_tickets(_cylinder(), settings(), rows).names == ("A",)  # no dip is 8123 m
     path = settings(("[closing]", "[csv]\nseparator = ';'\ndecimal = ','\n[closing]"))
     tickets = read_tickets(_cylinder(), path, rows)
     assert tickets.transfer.gaugings["closing"].level_m.tolist() == [8.123]

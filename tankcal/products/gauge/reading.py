@@ -7,7 +7,7 @@ import numpy as np
 
 from tankcal import record as records
 from tankcal.adjust import CRITICAL
-from tankcal.errors import InputError
+from tankcal.errors import InputError, Problem
 from tankcal.exports.exporting import shortening_m
 from tankcal.job.checking import missing_beside
 from tankcal.job.contract.keys import CSV
@@ -15,7 +15,7 @@ from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.entries import ColumnValues, read_columns
 from tankcal.job.fields import Field
 from tankcal.job.folder import read_csv
-from tankcal.job.tables import Log, make_table, read_bytes
+from tankcal.job.tables import Log, make_table, read_bytes, shown
 from tankcal.messages import message
 from tankcal.products.gauge.deviation import LEAST_LEVELS, Dips, KnownSlope, slope_of_tilt
 from tankcal.products.settings import read_sections
@@ -196,6 +196,11 @@ def read_comparison(folder):
     folder, log = Path(folder).absolute(), Log()
     settings = folder if folder.suffix == ".toml" else folder / SETTINGS
     readings = settings.with_name(READINGS)
+    if not settings.is_file():
+        text = message("gauge_no_settings", "no {file}; expected it in this folder: tankcal gauge "
+                       "{name} --new writes empty input files", file=settings.name,
+                       name=folder.name)  # fmt: skip
+        raise InputError(Problem(settings.parent.name, text))
     source, table = _read_files(settings, readings, log)
     tank = _tank(source, settings.parent)
     files = tuple((path.name, digest_of(path)) for path in (settings, readings))
@@ -314,6 +319,11 @@ def _tank(source, folder):
         return None
     path = folder / name
     path = path / "record.json" if path.is_dir() else path
+    if not path.is_file():
+        text = message("gauge_no_record", "found {name}, where no record is; expected record.json "
+                       "of the tank, or its folder", name=shown(name))  # fmt: skip
+        source.tell("gauge.record", text)
+        return None
     if read_bytes(path, source.log) is None:
         return None
     try:
@@ -446,9 +456,13 @@ def _mean_readings(source, table, lengths, by_ullage, u, movement):
     level = np.where(by_ullage, (height or 0.0) - lengths, lengths)
     gauge = table.numbers("gauge_m")
     for place in np.flatnonzero(np.abs(gauge - level) > LARGEST_DEVIATION_M):
-        text = message("gauge_far", "differs from the dip by {off:.3f} m; expected less than "
-                       "{most:g} m: is it an ullage, or in another unit?",
-                       off=gauge[place] - level[place], most=LARGEST_DEVIATION_M)  # fmt: skip
+        text = message(
+            "gauge_far",
+            "differs from the dip by {off:.3f} m; expected less than {most:g} m: {cause}",
+            off=gauge[place] - level[place],
+            most=LARGEST_DEVIATION_M,
+            cause=_find_cause(source, table, place, lengths[place], by_ullage[place]),
+        )
         source.log.problem(READINGS, text, table.rows[place], "gauge_m")
     groups = {}
     for place, name in enumerate(table.of("level")):
@@ -458,6 +472,12 @@ def _mean_readings(source, table, lengths, by_ullage, u, movement):
             text = message("gauge_mixed", "the level {name} has dips and ullages; expected either "
                            "of them", name=name)  # fmt: skip
             source.log.problem(READINGS, text, table.rows[places[0]], "level")
+        if np.ptp(level[places]) > LEAST_STEP_M:
+            text = message("gauge_repeats_apart", "the readings of {name} are up to {apart:.3f} m "
+                           "apart; expected repeats within {least:g} m: give each level its own "
+                           "name", name=name, apart=np.ptp(level[places]),
+                           least=LEAST_STEP_M)  # fmt: skip
+            source.log.problem(READINGS, text, table.rows[places[-1]], "level")
         _warn_of_outliers(source, table, gauge - level, places, u)
     order = sorted(groups, key=lambda name: level[groups[name]].mean())
     rows = [groups[name] for name in order]
@@ -488,6 +508,26 @@ def _mean_readings(source, table, lengths, by_ullage, u, movement):
         shared["reference height"] = np.where(is_ullage, -u["u_reference_mm"] / 1000, 0.0)
     moved = np.zeros(len(rows)) if movement is None else movement(mean_level)
     return tuple(order), counts, Dips(mean_level, mean(gauge), moved, scatter, shared)
+
+
+def _find_cause(source, table, place, length_m, by_ullage):
+    """Probable cause of an indication that is far from the dip, as a Message."""
+    gauge, tape = table.numbers("gauge_m")[place], table.numbers("tape_c")[place]
+    height = source.sections["reference"]["height_m"]
+
+    def is_near(first, second):
+        return abs(first - second) <= LARGEST_DEVIATION_M  # False for nan
+
+    if is_near(tape, length_m):
+        return message("gauge_cause_gauge", "are gauge_m and tape_c swapped?")
+    if is_near(tape, gauge):
+        return message("gauge_cause_tape", "are the tape reading and tape_c swapped?")
+    if by_ullage and is_near(length_m, gauge):
+        return message("gauge_cause_dip", "it agrees as a dip; move it to the column dip_m")
+    if not by_ullage and height is not None and is_near(height - length_m, gauge):
+        return message("gauge_cause_ullage", "it agrees as an ullage; move it to the column "
+                       "ullage_m")  # fmt: skip
+    return message("gauge_cause_unknown", "is it an ullage, or in another unit?")
 
 
 def _warn_of_outliers(source, table, difference, places, u):
