@@ -168,8 +168,8 @@ def _tell_sights_missing(raw, tables, log):
     has_readings = has_survey(tables) or is_strapped(tables)  # otherwise reported as missing points
     if has_targets or not has_readings or not has_rows(tables["setups"]):
         return
-    of_methods = (method.readings_table for method in methods() if method.is_sighted)
-    sights = [name for name in of_methods if name in raw.tables]
+    methods_with_sights = (method for method in methods_for("vertical") if method.is_sighted)
+    sights = [m.readings_table for m in methods_with_sights if m.readings_table in raw.tables]
     for name in sights:
         if raw.tables[name] is not None:
             log.problem(raw.tables[name].file, _IN_PLACE_OF_POINTS[name])
