@@ -1,6 +1,6 @@
 """Records of every kind of job, small, and those of released versions that are kept.
 
-python tests/kept_records.py   keeps a record of each kind, and lists their keys, when a version is
+PYTHONPATH=tests/support:tests/report:tests/job python tests/kept_records.py   keeps a record of each kind, and lists their keys, when a version is
                                released
 """
 
