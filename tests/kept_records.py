@@ -1,7 +1,8 @@
 """Records of every kind of job, small, and those of released versions that are kept.
 
-PYTHONPATH=tests/support:tests/report:tests/job python tests/kept_records.py   keeps a record of each kind, and lists their keys, when a version is
-                               released
+Keep a record of each kind, and list their keys, when a version is released:
+
+    PYTHONPATH=tests/support:tests/report:tests/job python tests/kept_records.py
 """
 
 import gzip

@@ -4,7 +4,9 @@ What is compared is what a reader reads: every byte of the CSV files, every cell
 with its number format, every text and number of the papers before their pages are set. The bytes
 of PDF, HTML and figures also tell the version of typst, XlsxWriter and matplotlib.
 
-PYTHONPATH=tests/support python tests/record/test_kept_papers.py   writes what is expected anew, for a change that is meant
+Write what is expected anew, for a change that is meant:
+
+    PYTHONPATH=tests/support python tests/record/test_kept_papers.py
 """
 
 import hashlib
