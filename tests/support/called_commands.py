@@ -464,7 +464,7 @@ def _make_quantities(folder):
     ticket = record | {"ticket.toml": TICKET}
     gauge = record | {"gauge.toml": GAUGE, "readings.csv": READINGS}
     command = ("ticket", "{in}/record.json", "{in}/ticket.toml")
-    return {
+    bases = {
         "ticket": Base((*command, "--json"), ticket, ("ticket.toml",), complains=False),
         "ticket record": Base((*command, "--json"), ticket, ("record.json",), complains=False),
         "ticket many": Base(
@@ -479,6 +479,7 @@ def _make_quantities(folder):
         "chart": Base(("chart", "{in}/record.json", "--step-cm", "5", "--json", "--out",
                        "{out}/chart.pdf"), record, complains=False),
     }  # fmt: skip
+    return {name: replace(base, exact=("record.json",)) for name, base in bases.items()}
 
 
 def _make_plans(_):
