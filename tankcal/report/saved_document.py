@@ -107,7 +107,8 @@ class SavedDocument:
         Parameters
         ----------
         result : dataclass or dict
-            Content of the saved file, or the same as plain data.
+            Content of the saved file, such as the result of `recalibration.comparison.compare`, or
+            the same as plain data.
         folder : str or Path
             Folder of the results; it is created if it does not exist.
         language : str, optional

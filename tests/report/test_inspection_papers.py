@@ -22,7 +22,7 @@ from tankcal.errors import InputError
 from tankcal.record.inspection import CHECKS, VERDICTS
 from tankcal.report import blocks
 from tankcal.report.inspection import (
-    FILES,
+    DOCUMENT,
     InspectionPaper,
     rebuild,
     tables,
@@ -469,7 +469,7 @@ def test_a_workbook_of_little_has_no_empty_sheets(tmp_path):
 @pytest.mark.slow
 def test_the_dataclass_and_its_plain_data_give_the_same_bytes(written, tmp_path):
     write_inspection(inspection(), tmp_path / "i", LANGUAGE_OF["plain"])
-    for name in FILES:
+    for name in DOCUMENT.files:
         assert (tmp_path / "i" / name).read_bytes() == (written / "plain" / name).read_bytes()
 
 

@@ -17,10 +17,7 @@ from tankcal.text.digits import LITRE_DECIMALS, NOTHING
 from tankcal.text.shipped import DEFAULT
 from tankcal.text.words import load_words
 
-__all__ = [
-    *("DOCUMENT", "FILES", "ComparisonPaper", "rebuild", "refuse_foreign"),
-    "write_comparison",
-]
+__all__ = ["DOCUMENT", "ComparisonPaper", "rebuild", "refuse_foreign", "write_comparison"]
 
 FILE, WORKBOOK = "comparison.json", "comparison.xlsx"
 TABLES = {
@@ -177,32 +174,5 @@ DOCUMENT = SavedDocument(
     ),
     tables=TABLES,
 )
-FILES, refuse_foreign, rebuild = DOCUMENT.files, DOCUMENT.refuse_foreign, DOCUMENT.rebuild
-
-
-def write_comparison(comparison, folder, language=None, progress=None, letterhead=None):
-    """Write comparison.json, CSV files, workbook, PDF and web page, all or nothing.
-
-    Parameters
-    ----------
-    comparison : ComparisonFile or dict
-        Result of `recalibration.comparison.compare`, or the same as plain data.
-    folder : path
-        Created if missing. An earlier comparison in the folder is replaced.
-    language : str, optional
-        Language of papers and workbook, one of languages.LANGUAGES; None: English.
-    progress : callable, optional
-        progress(text), called at the beginning of each step.
-    letterhead : report.letterhead.Letterhead, optional
-        Letterhead of the laboratory that compares.
-
-    Returns
-    -------
-    list of Path
-
-    Raises
-    ------
-    InputError
-        For a folder with other files, or for data that are not a comparison.
-    """
-    return DOCUMENT.write(comparison, folder, language, progress, letterhead)
+refuse_foreign, rebuild = DOCUMENT.refuse_foreign, DOCUMENT.rebuild
+write_comparison = DOCUMENT.write

@@ -21,7 +21,7 @@ from tankcal.report.saved_paper import SavedPaper, bearable
 from tankcal.text.shipped import DEFAULT
 from tankcal.text.words import load_words
 
-__all__ = [*("DOCUMENT", "FILES", "HistoryPaper", "rebuild", "refuse_foreign"), "write_history"]
+__all__ = ["DOCUMENT", "HistoryPaper", "rebuild", "refuse_foreign", "write_history"]
 
 FILE, WORKBOOK = "history.json", "history.xlsx"
 TABLES = {
@@ -99,32 +99,5 @@ DOCUMENT = SavedDocument(
     ),
     tables=TABLES,
 )
-FILES, refuse_foreign, rebuild = DOCUMENT.files, DOCUMENT.refuse_foreign, DOCUMENT.rebuild
-
-
-def write_history(history, folder, language=None, progress=None, letterhead=None):
-    """Write history.json, CSV files, workbook, PDF and web page, all or nothing.
-
-    Parameters
-    ----------
-    history : HistoryFile or dict
-        Result of `recalibration.history.history_of`, or the same as plain data.
-    folder : path
-        Created if missing. An earlier history in the folder is replaced.
-    language : str, optional
-        Language of papers and workbook, one of languages.LANGUAGES; None: English.
-    progress : callable, optional
-        progress(text), called at the beginning of each step.
-    letterhead : report.letterhead.Letterhead, optional
-        Letterhead of the author.
-
-    Returns
-    -------
-    list of Path
-
-    Raises
-    ------
-    InputError
-        For a folder with other files, or for data that are not a history.
-    """
-    return DOCUMENT.write(history, folder, language, progress, letterhead)
+refuse_foreign, rebuild = DOCUMENT.refuse_foreign, DOCUMENT.rebuild
+write_history = DOCUMENT.write

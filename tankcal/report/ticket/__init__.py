@@ -15,7 +15,7 @@ from tankcal.report.ticket.tables import BUDGET, QUANTITIES, STEPS, UNCERTAINTIE
 from tankcal.text.shipped import DEFAULT
 from tankcal.text.words import load_words, message_sentence
 
-__all__ = ["DOCUMENT", "FILES", "TicketPaper", "rebuild", "refuse_foreign", "write_ticket"]
+__all__ = ["DOCUMENT", "TicketPaper", "refuse_foreign", "write_ticket"]
 
 FILE, WORKBOOK, XML = "ticket.json", "ticket.xlsx", "ticket.xml"
 TABLES = {
@@ -163,32 +163,5 @@ DOCUMENT = SavedDocument(
     others={XML: _write_xml},
     recomputed_by="tankcal.products.quantity.recomputation:compute_again",
 )
-FILES, refuse_foreign, rebuild = DOCUMENT.files, DOCUMENT.refuse_foreign, DOCUMENT.rebuild
-
-
-def write_ticket(ticket, folder, language=None, progress=None, letterhead=None):
-    """Write ticket.json, CSV files, workbook, XML, PDF and web page: all files or none.
-
-    Parameters
-    ----------
-    ticket : TicketFile or dict
-        Result of `products.quantity.saving.ticket_file`, or its plain data.
-    folder : path
-        Created if missing. An earlier ticket in the folder is replaced.
-    language : str, optional
-        Language of PDF, page and workbook (languages.LANGUAGES); None: English.
-    progress : callable, optional
-        progress(text), called at the beginning of each step.
-    letterhead : report.letterhead.Letterhead, optional
-        Letterhead of the author.
-
-    Returns
-    -------
-    list of Path
-
-    Raises
-    ------
-    InputError
-        For a folder with other files, or for data that are not a ticket.
-    """
-    return DOCUMENT.write(ticket, folder, language, progress, letterhead)
+refuse_foreign = DOCUMENT.refuse_foreign
+write_ticket = DOCUMENT.write
