@@ -1,7 +1,7 @@
 """Typesetting of formulas that the record contains in plain text.
 
-Only the patterns below become mathematics. They take words and numbers from the text; the rest of a
-sentence remains text.
+Only the formulas below become mathematics. Their patterns take words and numbers from the text; the
+rest of a sentence remains text.
 """
 
 import re
@@ -30,54 +30,61 @@ _SET_AS = (  # pattern of the plain text and LaTeX; a longer pattern precedes it
         r"-m \, (1 - %s / 8000) / (\rho_\text{ref} - %s)",
     ),
     (r"-m/rho_ref", r"-m / \rho_\text{ref}"),
-    # Steps of tickets.
-    (r"TOV = V\(h\)", r"\text{TOV} = V(h)"),
-    (r"FW = V\(h_w\)", r"\text{FW} = V(h_\text{w})"),
-    (r"t_S = \(7 t_L \+ t_A\)/8", r"t_\text{S} = (7 \, t_\text{L} + t_\text{A}) / 8"),
-    (r"t_S = t_L", r"t_\text{S} = t_\text{L}"),
-    (
-        r"CTSh = 1 \+ 2 α ΔT \+ \(α ΔT\)²",
-        r"\text{CTSh} = 1 + 2 \, \alpha \, \Delta T + (\alpha \, \Delta T)^2",
-    ),
-    (r"CTSh = s³ V\(h/s\)/V\(h\)", r"\text{CTSh} = s^3 \, V(h/s) / V(h)"),
-    (
-        r"ρ_b = ρ_s/VCF\(ρ_b, t_s\)",
-        r"\rho_\text{b} = \rho_\text{s} / \text{VCF}(\rho_\text{b}, t_\text{s})",
-    ),
-    (r"VCF\(ρ_b, t_L\)", r"\text{VCF}(\rho_\text{b}, t_\text{L})"),
-    (r"ρ_L = ρ_b VCF", r"\rho_\text{L} = \rho_\text{b} \, \text{VCF}"),
-    (
-        r"FRA = −m_r \(1/ρ_L − 1/ρ_ref\)",
-        r"\text{FRA} = -m_\text{r} \, (1/\rho_\text{L} - 1/\rho_\text{ref})",
-    ),
-    (r"FRA = −m_r/ρ_L", r"\text{FRA} = -m_\text{r} / \rho_\text{L}"),
-    (r"FRA = 0", r"\text{FRA} = 0"),
-    (
-        r"GOV = \(TOV − FW\) CTSh \+ FRA",
-        r"\text{GOV} = (\text{TOV} - \text{FW}) \, \text{CTSh} + \text{FRA}",
-    ),
-    (r"GSV = GOV VCF", r"\text{GSV} = \text{GOV} \, \text{VCF}"),
-    (r"CSW = 1 − S&W", r"\text{CSW} = 1 - \text{SW}"),
-    (r"NSV = GSV CSW", r"\text{NSV} = \text{GSV} \, \text{CSW}"),
-    (r"m = NSV ρ_b", r"m = \text{NSV} \, \rho_\text{b}"),
-    (
-        r"f = \(1 − ρ_a/ρ_b\)/\(1 − ρ_a/ρ_w\)",
-        r"f = (1 - \rho_\text{a}/\rho_\text{b}) / (1 - \rho_\text{a}/\rho_\text{w})",
-    ),
-    (r"W = m f", r"W = m \, f"),
     (r"ρ_([Labsw])\b", r"\rho_\text{%s}"),
 )
+# Formulas of the steps of tickets; their symbols do not depend on the language.
+STEP_FORMULAS = {
+    "tov_m3": "TOV = V(h)",
+    "fw_m3": "FW = V(h_w)",
+    "shell_c": "t_S = (7 t_L + t_A)/8",
+    "shell_c_insulated": "t_S = t_L",
+    "ctsh": "CTSh = 1 + 2 α ΔT + (α ΔT)²",
+    "ctsh_solid": "CTSh = s³ V(h/s)/V(h)",
+    "base_density": "ρ_b",
+    "base_density_observed": "ρ_b = ρ_s/VCF(ρ_b, t_s)",
+    "vcf": "VCF(ρ_b, t_L)",
+    "observed_density": "ρ_L = ρ_b VCF",
+    "fra_m3": "FRA = 0",
+    "fra_m3_in_table": "FRA = −m_r (1/ρ_L − 1/ρ_ref)",
+    "fra_m3_not_in_table": "FRA = −m_r/ρ_L",
+    "gov_m3": "GOV = (TOV − FW) CTSh + FRA",
+    "gsv_m3": "GSV = GOV VCF",
+    "csw": "CSW = 1 − S&W",
+    "nsv_m3": "NSV = GSV CSW",
+    "mass_kg": "m = NSV ρ_b",
+    "air_factor": "f = (1 − ρ_a/ρ_b)/(1 − ρ_a/ρ_w)",
+    "weight_kg": "W = m f",
+}
+# Notation of these formulas, and its LaTeX in the order of the replacements.
+_NOTATION = (
+    (r"S&W|[A-Z]{2,}[a-z]*", lambda match: rf"\text{{{match[0].replace('&', '')}}}"),
+    (r"_(\w+)", r"_\\text{\1}"),
+    (r"(?<![=+−,]) (?![=+−])", r" \\, "),  # a product, unless the blank is beside an operator
+    *(("α", r"\\alpha "), ("ρ", r"\\rho "), ("Δ", r"\\Delta ")),
+    *(("−", "-"), ("²", "^2"), ("³", "^3")),
+)
+
+
+def _step_latex(text):
+    """Return the LaTeX of the formula of a step of a ticket."""
+    for notation, latex in _NOTATION:
+        text = re.sub(notation, latex, text)
+    return text
 
 
 @cache
 def _patterns():
-    return re.compile("|".join(f"(?P<f{i}>{pattern})" for i, (pattern, _) in enumerate(_SET_AS)))
+    """Return the pattern of any formula, and the LaTeX of each of its groups."""
+    steps = sorted(STEP_FORMULAS.values(), key=len, reverse=True)
+    set_as = *((rf"(?<!\w){re.escape(text)}(?!\w)", _step_latex(text)) for text in steps), *_SET_AS
+    patterns = (f"(?P<f{i}>{pattern})" for i, (pattern, _) in enumerate(set_as))
+    return re.compile("|".join(patterns)), [latex for _, latex in set_as]
 
 
 def formula_nodes(text):
     """Split a sentence into nodes {"t": "text"} and {"t": "math"} (with alternative text)."""
     nodes, end_of_last = [], 0
-    for match in _patterns().finditer(text):
+    for match in _patterns()[0].finditer(text):
         if match.start() > end_of_last:
             nodes.append({"t": "text", "s": text[end_of_last : match.start()]})
         nodes.append(_math(match))
@@ -90,7 +97,7 @@ def formula_nodes(text):
 def _math(match):
     kind = match.lastgroup
     first = match.re.groupindex[kind]
-    latex = _SET_AS[int(kind[1:])][1]
+    latex = _patterns()[1][int(kind[1:])]
     words = match.groups()[first : first + latex.count("%s")]
     read = formula(latex % tuple(word.replace(",", "{,}") for word in words))
     return {"t": "math", "typst": read.typst, "mathml": read.mathml, "alt": match[0]}

@@ -13,7 +13,7 @@ from tankcal.pipeline.tanks import corrections
 from tankcal.report import blocks
 from tankcal.report.pdf import pdf
 from tankcal.report.plain import Column, PlainPaper
-from tankcal.report.plain_formulas import formula_nodes
+from tankcal.report.plain_formulas import STEP_FORMULAS, formula_nodes
 from tankcal.report.web import block_html
 from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import load_words
@@ -63,11 +63,22 @@ def test_a_sentence_with_its_formulas_read_out_is_the_sentence(language):
         ("r_interno = r − t", 'r_(upright("interno")) \\= r minus t'),
         ("-m/rho_ref", 'minus m \\/ rho_(upright("ref"))'),
         ("√(1 + m²)", "sqrt(1 plus m^(2))"),
+        (
+            "t_S = (7 t_L + t_A)/8",
+            't_(upright("S")) \\= \\( 7 thin t_(upright("L")) plus t_(upright("A")) \\) \\/ 8',
+        ),
+        ("CSW = 1 − S&W", 'upright("CSW") \\= 1 minus upright("SW")'),
     ],
 )
 def test_a_formula_as_typst(text, typst):
     (node,) = formula_nodes(text)
     assert (node["typst"], node["alt"]) == (typst, text)
+
+
+@pytest.mark.parametrize("text", STEP_FORMULAS.values())
+def test_the_formula_of_a_step_is_set_as_a_whole(text):
+    (node,) = formula_nodes(text)
+    assert (node["t"], node["alt"]) == ("math", text)
 
 
 @pytest.mark.parametrize("text", [HOSTILE, "", "–", "r_1 = r − t", "g = x", "weighing = 3"])

@@ -1,5 +1,6 @@
 """Tables of a ticket, declared once for PDF, web page, workbook and CSV, and their rows."""
 
+from tankcal.report.plain_formulas import STEP_FORMULAS
 from tankcal.report.tables import Column, Table
 from tankcal.tank.gauging import assumed_u_vcf
 from tankcal.text.digits import NOTHING, fixed, format_with_u, shortest
@@ -9,29 +10,6 @@ QUANTITY_UNITS = {  # in the order of the calculation
     **dict.fromkeys(("mass_kg", "weight_kg"), "kg"),
 }
 STEP_DECIMALS = {"m3": 3, "kg": 1, "kg/m3": 2, "degC": 2, "": 6}
-# Formulas of the steps; their symbols do not depend on the language.
-FORMULAS = {
-    "tov_m3": "TOV = V(h)",
-    "fw_m3": "FW = V(h_w)",
-    "shell_c": "t_S = (7 t_L + t_A)/8",
-    "shell_c_insulated": "t_S = t_L",
-    "ctsh": "CTSh = 1 + 2 α ΔT + (α ΔT)²",
-    "ctsh_solid": "CTSh = s³ V(h/s)/V(h)",
-    "base_density": "ρ_b",
-    "base_density_observed": "ρ_b = ρ_s/VCF(ρ_b, t_s)",
-    "vcf": "VCF(ρ_b, t_L)",
-    "observed_density": "ρ_L = ρ_b VCF",
-    "fra_m3": "FRA = 0",
-    "fra_m3_in_table": "FRA = −m_r (1/ρ_L − 1/ρ_ref)",
-    "fra_m3_not_in_table": "FRA = −m_r/ρ_L",
-    "gov_m3": "GOV = (TOV − FW) CTSh + FRA",
-    "gsv_m3": "GSV = GOV VCF",
-    "csw": "CSW = 1 − S&W",
-    "nsv_m3": "NSV = GSV CSW",
-    "mass_kg": "m = NSV ρ_b",
-    "air_factor": "f = (1 − ρ_a/ρ_b)/(1 − ρ_a/ρ_w)",
-    "weight_kg": "W = m f",
-}
 U_UNITS = {  # printed unit of each key of [uncertainty]
     "u_dip_mm": "mm", "u_tape_ppm": "ppm", "u_water_dip_mm": "mm", "u_temperature_k": "K",
     "u_thermometer_k": "K", "u_ambient_k": "K", "u_density_kg_m3": "kg/m³", "u_sw_percent": "%",
@@ -63,7 +41,7 @@ def formula_of(saved, step):
         step = "base_density_observed"
     elif step == "fra_m3" and table["roof"]:
         step = f"fra_m3_{table['roof']}"
-    return FORMULAS[step]
+    return STEP_FORMULAS[step]
 
 
 def source_of(paper, step):
