@@ -39,18 +39,14 @@ const MOST_ROUNDS = 200; // of iterations for the density at the base
 const ROUNDS_OF_GROUPS = 30; // later rounds keep the group, so that it cannot alternate
 const CONVERGED = 1e-13; // relative
 const ROUNDS_OF_SLOPES = 12; // derivatives converge as values do, some rounds later
-const BASES_C = { "15C": 15, "20C": 20, "60F": 28 / 1.8 };
 
 /** Polynomial with coefficients from the highest power. */
 const horner = (coefficients, x) => coefficients.reduce((total, c) => plus(times(total, x), c), 0);
 
-function glassCorrection(celsius, scale) {
-  if (scale === "60F") {
-    const step = 1.8 * (celsius - BASES_C["60F"]);
-    return 1 - 0.00001278 * step - 0.0000000062 * step ** 2;
-  }
-  const step = celsius - BASES_C[scale];
-  return 1 - 0.000023 * step - 0.00000002 * step ** 2;
+function glassCorrection({ glass, bases_c: bases }, celsius, scale) {
+  const [linear, quadratic] = glass[scale];
+  const step = (scale === "60F" ? 1.8 : 1) * (celsius - bases[scale]);
+  return 1 - linear * step - quadratic * step ** 2;
 }
 
 /** The root of density = next(density, group), with its derivatives. */
@@ -71,14 +67,15 @@ function iterate(start, next) {
 
 /** D1250 of 1980 or 2004 at one base: through the density at 15 degC or 60 degF. */
 function petroleum(constants, { edition, group, base, alpha }) {
+  const { bases_c: bases } = constants;
   const is2004 = edition === "D1250-04";
   const form = is2004 ? "2004" : base === "60F" ? "60F" : "15C";
   const [delta, degree] = [is2004 ? constants.delta_60 : 0, form === "15C" ? 1 : 1.8];
   const parts = group === "coefficient" ? null : constants.groups[form][group];
 
   const steps = (t) => {
-    if (form === "15C") return minus(t, 15);
-    if (form === "60F") return times(1.8, minus(t, BASES_C["60F"]));
+    if (form === "15C") return minus(t, bases["15C"]);
+    if (form === "60F") return times(1.8, minus(t, bases["60F"]));
     const tau = over(t, 630);
     const shift = horner([...constants.scales.slice().reverse(), 0], tau);
     return minus(plus(times(1.8, minus(t, shift)), 32), constants.zero_68_f);
@@ -116,28 +113,30 @@ function petroleum(constants, { edition, group, base, alpha }) {
     return [(constants.lowest_f - 32) / 1.8, (high - 32) / 1.8];
   };
   return {
-    base_c: BASES_C[base],
+    base_c: bases[base],
     densities: [least, most],
     limits,
     baseDensity: (density, t) => {
       const rho = root(density, t);
-      return times(rho, exponential(logFactor(rho, BASES_C[base])));
+      return times(rho, exponential(logFactor(rho, bases[base])));
     },
     factor: (density, t) => {
-      const rho = root(density, BASES_C[base]);
-      return exponential(minus(logFactor(rho, t), logFactor(rho, BASES_C[base])));
+      const rho = root(density, bases[base]);
+      return exponential(minus(logFactor(rho, t), logFactor(rho, bases[base])));
     },
   };
 }
 
 /** The tables of Brazil, CNP 6/70, through their fit. */
 function brazil(constants, isRounded) {
-  const { classes, least, most, limits_c: limits, three_to: threeTo, four_from: fourFrom } = constants;
+  const { classes, least, most, limits_c: limits, three_to: threeTo, four_from: fourFrom } =
+    constants.brazil;
+  const base = constants.bases_c["20C"];
   const classOf = (relative) => classes.find(([high], place) =>
     relative <= high || place === classes.length - 1).slice(1);
   const fit = (relative, t) => {
     const [p1, p2, p3, p4] = classOf(lift(relative).value);
-    const x = minus(t, 20);
+    const x = minus(t, base);
     return sum(1, times(p2, x), product(p4, x, x), over(plus(times(p1, x), product(p3, x, x)), relative));
   };
   /** To the nearest whole number, a half to the even one. */
@@ -146,16 +145,16 @@ function brazil(constants, isRounded) {
     return Math.abs(value % 1) === 0.5 && whole % 2 !== 0 ? whole - 1 : whole;
   };
   return {
-    base_c: 20,
+    base_c: base,
     glass_scale: "20C",
     densities: [1000 * least, 1000 * most],
     limits: () => limits,
     baseDensity: (density, t) => {
       const seen = over(density, 1000);
-      const x = t - 20;
+      const x = t - base;
       return times(1000, iterate(seen, (rho, bound) => {
         const [p1, p2, p3, p4] = classOf(bound ?? rho.value);
-        return times(glassCorrection(t, "20C") / (1 + p2 * x + p4 * x ** 2),
+        return times(glassCorrection(constants, t, "20C") / (1 + p2 * x + p4 * x ** 2),
           minus(seen, p1 * x + p3 * x ** 2));
       }));
     },
@@ -173,10 +172,10 @@ function brazil(constants, isRounded) {
   };
 }
 
-function constant(alpha, base, limits) {
-  const factor = (density, t) => over(1, plus(1, times(alpha, minus(t, BASES_C[base]))));
+function constant({ bases_c: bases, constant_c: limits }, alpha, base) {
+  const factor = (density, t) => over(1, plus(1, times(alpha, minus(t, bases[base]))));
   return {
-    base_c: BASES_C[base],
+    base_c: bases[base],
     densities: [0, Infinity],
     limits: () => limits,
     baseDensity: (density, t) => over(density, factor(null, lift(t))),
@@ -200,8 +199,8 @@ function correctionOf(constants, given) {
     if (!(alpha >= low && alpha <= high)) throw new Refusal("alpha_range");
   }
   if (hasGroup) return petroleum(constants, { edition: correction, group, base, alpha });
-  if (correction === "coefficient") return constant(alpha, base, constants.constant_c);
-  return brazil(constants.brazil, correction === "CNP-6-70");
+  if (correction === "coefficient") return constant(constants, alpha, base);
+  return brazil(constants, correction === "CNP-6-70");
 }
 
 /** Volume of the table at a dip, linear between rows; the level has derivatives. */
@@ -242,14 +241,21 @@ function vcfScale(rule, celsius, base) {
   const [low, high] = [rule.at_k[piece], rule.at_k[piece + 1]];
   const [below, above] = [rule.percent[piece], rule.percent[piece + 1]];
   const percent = below + ((distance - low) * (above - below)) / (high - low);
-  return (Math.sign(celsius - base) * percent) / 100 / 1.96;
+  return (Math.sign(celsius - base) * percent) / 100 / rule.k;
 }
+
+/** Whether a value is a number within its limits; a blank is not. */
+const isWithin = (value, [low, high]) => value !== null && value >= low && value <= high;
 
 /** Dips and temperatures of one gauging, checked. */
 function gaugingOf(tank, given, place, isInsulated) {
   const refuse = (key) => { throw new Refusal(key, place); };
   const { dip, ullage, water, liquid, ambient } = given;
-  if ([dip, ullage, water, liquid, ambient].some(Number.isNaN)) refuse("no_number");
+  const readings = { dip_m: dip, ullage_m: ullage, water_dip_m: water, temperature_c: liquid,
+    ambient_c: ambient };
+  for (const [key, value] of Object.entries(readings)) {
+    if (value !== null && !isWithin(value, tank.input_limits[key])) refuse("no_number");
+  }
   if (dip !== null && ullage !== null) refuse("dip_and_ullage");
   if (dip === null && ullage === null) refuse("no_dip");
   if (ullage !== null && tank.reference_height_m === null) refuse("no_reference");
@@ -311,21 +317,24 @@ const QUANTITIES = ["tov", "gov", "gsv", "nsv", "mass", "weight"];
  */
 function quantityOf(tank, table, given) {
   const correction = correctionOf(tank.constants, given);
-  if (!(given.density >= 300 && given.density <= 2000)) throw new Refusal("density_range");
+  const limits = tank.input_limits;
+  if (!isWithin(given.density, limits.density_kg_m3)) throw new Refusal("density_range");
   if (!given.density_is) throw new Refusal("density_is_blank");
   const isObserved = given.density_is === "observed";
-  if (isObserved && !(given.sample >= -60 && given.sample <= 200 && given.sample !== null)) {
+  if (isObserved && !isWithin(given.sample, limits.density_temperature_c)) {
     throw new Refusal("sample_blank");
   }
   if (!isObserved && (given.sample !== null || given.hydrometer)) throw new Refusal("sample_unused");
-  if (given.sw !== null && !(given.sw >= 0 && given.sw <= 20)) throw new Refusal("sw_range");
+  if (given.sw !== null && !isWithin(given.sw, limits.sw_percent)) throw new Refusal("sw_range");
   for (const [name, u] of Object.entries(given.u)) {
     if (!(u >= 0) || (u === null && name !== "u_vcf")) throw new Refusal("u_wrong");
   }
   let base = input(given.density, "density");
   if (isObserved) {
-    let glass = given.hydrometer ? glassCorrection(given.sample, given.hydrometer) : 1;
-    if (correction.glass_scale) glass /= glassCorrection(given.sample, correction.glass_scale);
+    let glass = given.hydrometer ? glassCorrection(tank.constants, given.sample, given.hydrometer) : 1;
+    if (correction.glass_scale) {
+      glass /= glassCorrection(tank.constants, given.sample, correction.glass_scale);
+    }
     base = correction.baseDensity(times(base, glass), given.sample);
   }
   const [least, most] = correction.densities;

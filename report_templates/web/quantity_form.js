@@ -12,9 +12,7 @@
   };
   const UNITS = {
     alpha: "1/K", density: "kg/m³", sample: "°C", sw: "%", dip: "m", ullage: "m", water: "m",
-    liquid: "°C", ambient: "°C", u_dip: "mm", u_tape: "ppm", u_water: "mm", u_temperature: "K",
-    u_thermometer: "K", u_ambient: "K", u_density: "kg/m³", u_sw: "%", u_expansion: "1/K",
-    u_vcf: "%",
+    liquid: "°C", ambient: "°C", ...tank.units_of_u,
   };
   const CHOICES = {
     correction: [["D1250-04", "D1250-04"], ["D1250-80", "D1250-80"],
@@ -27,8 +25,6 @@
   };
   const PRODUCT = ["correction", "group", "base", "alpha", "density", "density_is", "sample",
     "hydrometer", "sw"];
-  const UNCERTAINTIES = ["u_dip", "u_tape", "u_water", "u_temperature", "u_thermometer", "u_ambient",
-    "u_density", "u_sw", "u_expansion", "u_vcf"];
   const GAUGING = ["dip", "ullage", "water", "liquid", "ambient"];
   const STEPS = [ // label, decimals, unit
     ["tov", 3, "m³"], ["fw", 3, "m³"], ["shell", 2, "°C"], ["ctsh", 6, ""], ["vcf", 6, ""],
@@ -138,7 +134,7 @@
     group(spelt.columns.product, [...PRODUCT, "insulated"].map((key) => field(key))),
     ...["opening", "closing"].map((place) => group(`${spelt.headings.gauging}: ${heading(place)}`,
       GAUGING.map((key) => field(key, `${key}-${place}`)))),
-    group(spelt.headings.uncertainty, UNCERTAINTIES.map((key) => field(key))),
+    group(spelt.headings.uncertainty, Object.keys(tank.u).map((key) => field(key))),
     remark,
     table,
     make("p", spelt.notes.steps, { className: "note" }),

@@ -1,4 +1,4 @@
-"""Assumed uncertainties of a gauging, for tickets that do not declare their own."""
+"""Assumed uncertainties of a gauging, and the limits of its readings."""
 
 import numpy as np
 
@@ -19,6 +19,31 @@ ASSUMPTIONS = {
     "u_expansion_per_k": (1e-6, "assumed"),
 }
 UNCERTAINTIES = {name: value for name, (value, _) in ASSUMPTIONS.items()}
+UNITS_OF_U = {
+    "u_dip_mm": "mm",
+    "u_tape_ppm": "ppm",
+    "u_water_dip_mm": "mm",
+    "u_temperature_k": "K",
+    "u_thermometer_k": "K",
+    "u_ambient_k": "K",
+    "u_density_kg_m3": "kg/m³",
+    "u_sw_percent": "%",
+    "u_expansion_per_k": "1/K",
+    "u_vcf_percent": "%",
+}
+# Their fields in the calculators of workbook and web page; the optional u of VCF is the last one.
+FIELDS_OF_U = {
+    "u_dip_mm": "u_dip",
+    "u_tape_ppm": "u_tape",
+    "u_water_dip_mm": "u_water",
+    "u_temperature_k": "u_temperature",
+    "u_thermometer_k": "u_thermometer",
+    "u_ambient_k": "u_ambient",
+    "u_density_kg_m3": "u_density",
+    "u_sw_percent": "u_sw",
+    "u_expansion_per_k": "u_expansion",
+    "u_vcf_percent": "u_vcf",
+}
 KEY_OF_INPUT = {  # input of the budget without its state: key of its standard uncertainty
     "dip": "u_dip_mm",
     "water dip": "u_water_dip_mm",
@@ -36,6 +61,19 @@ KEY_OF_INPUT = {  # input of the budget without its state: key of its standard u
 # distance from the base, which is our own rule.
 VCF_AT_K = np.array([0.0, 22.2, 50.0, 77.8, 105.6])
 VCF_PERCENT = np.array([0.0, 0.05, 0.15, 0.25, 0.35])
+VCF_K = 1.96  # coverage factor of this expanded uncertainty
+
+# Lowest and highest accepted value of the keys of a ticket.
+LIMITS = {
+    "dip_m": (0, 200),
+    "ullage_m": (0, 200),
+    "water_dip_m": (0, 200),
+    "temperature_c": (-60, 200),
+    "ambient_c": (-60, 70),
+    "density_kg_m3": (300, 2000),  # a lower value is a relative density, or in g/cm3
+    "density_temperature_c": (-60, 200),
+    "sw_percent": (0, 20),
+}
 
 
 def assumed_u_vcf(temperature_c, base_c):
@@ -58,4 +96,4 @@ def assumed_u_vcf(temperature_c, base_c):
     beyond = np.maximum(distance - VCF_AT_K[-1], 0.0)
     slope = (VCF_PERCENT[-1] - VCF_PERCENT[-2]) / (VCF_AT_K[-1] - VCF_AT_K[-2])
     percent = np.interp(distance, VCF_AT_K, VCF_PERCENT) + slope * beyond
-    return np.sign(temperature_c - base_c) * percent / 100 / 1.96
+    return np.sign(temperature_c - base_c) * percent / 100 / VCF_K

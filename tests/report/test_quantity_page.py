@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from browser import Browser
 from calculated_tanks import afloat, example_with_rows
-from quantity_cases import CASES, GRID, STEPS, U_KEYS, ULLAGES, ticket_of
+from quantity_cases import CASES, CLOSING, GRID, STEPS, ULLAGES, case, ticket_of
 
 from tankcal.errors import InputError
 from tankcal.products.quantity.chain import QUANTITIES
@@ -17,7 +17,7 @@ from tankcal.report import blocks
 from tankcal.report.paper import Paper
 from tankcal.report.web import page
 from tankcal.report.web.calculator_data import calculator
-from tankcal.tank.gauging import UNCERTAINTIES
+from tankcal.tank.gauging import FIELDS_OF_U, UNCERTAINTIES
 from tankcal.text.shipped import shipped_folder
 from tankcal.text.words import load_words
 
@@ -60,7 +60,7 @@ def given_of(sections):
         "hydrometer": (product.get("hydrometer") or "").removeprefix("glass "),
         "sw": product.get("sw_percent"),
         "insulated": bool(sections.get("shell", {}).get("insulated")),
-        "u": {field: own.get(name, UNCERTAINTIES[name]) for name, field in U_KEYS.items()},
+        "u": {field: own.get(name, UNCERTAINTIES[name]) for name, field in FIELDS_OF_U.items()},
     }
     for state in ("opening", "closing"):
         given[state] = {
@@ -121,6 +121,25 @@ def test_the_page_shows_the_numbers_of_the_ticket(kind, tmp_path):
             assert moved["value"] == pytest.approx(total.value[0, place], rel=SAME), (key, name)
             assert moved["U"] == pytest.approx(total.U[0, place], rel=SAME_U), (key, name)
             assert moved["k"] == pytest.approx(total.k[0, place], rel=1e-6), (key, name)
+
+
+OUTSIDE = {  # values that the reader of tickets refuses
+    "dip": CLOSING | {"dip_m": -0.1}, "ullage": {"ullage_m": 201.0, "temperature_c": 20.0},
+    "water": CLOSING | {"water_dip_m": -0.1}, "liquid": CLOSING | {"temperature_c": 201.0},
+    "air": CLOSING | {"ambient_c": 77.0},
+}  # fmt: skip
+
+
+def test_the_page_refuses_a_reading_outside_the_limits_of_a_ticket(tmp_path):
+    record = example_with_rows(0.2, tmp_path)[1]
+    table = read_table(tmp_path / "record.json")
+    product = {"group": "products", "base": "20C"}
+    cases = {key: case("D1250-04", 842.0, closing=own, **product) for key, own in OUTSIDE.items()}
+    for sections in cases.values():
+        with pytest.raises(InputError):
+            ticket_of(sections, tmp_path, table)
+    results = run(record, [given_of(sections) for sections in cases.values()], tmp_path)
+    assert results == [{"refusal": "no_number"}] * len(cases)
 
 
 FILL = """

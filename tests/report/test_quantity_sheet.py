@@ -11,7 +11,7 @@ import numpy as np
 import openpyxl
 import pytest
 from calculated_tanks import afloat, example_with_rows
-from quantity_cases import CASES, GRID, STEPS, U_KEYS, ULLAGES, case, ticket_of
+from quantity_cases import CASES, GRID, STEPS, ULLAGES, case, ticket_of
 from recalculation import recalculated
 
 from tankcal.errors import InputError
@@ -23,6 +23,7 @@ from tankcal.report.workbook.capacity import capacity_sheet
 from tankcal.report.workbook.quantity import quantity_sheets
 from tankcal.report.workbook.quantity.form import FORM, KEYS
 from tankcal.report.workbook.quantity.uncertainty import QUANTITIES as OF_SHEET
+from tankcal.tank.gauging import FIELDS_OF_U
 from tankcal.text.words import load_words, translate_record
 
 # openpyxl does not know our data bars, and says so each time
@@ -57,7 +58,7 @@ def cells_of(sections):
                           ("temperature_c", "liquid"), ("ambient_c", "ambient")):  # fmt: skip
             cells[f"{name}_{letter}"] = sections.get(state, {}).get(key)
     for name, value in sections.get("uncertainty", {}).items():
-        cells[U_KEYS[name]] = value
+        cells[FIELDS_OF_U[name]] = value
     return cells
 
 

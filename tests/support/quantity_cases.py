@@ -11,12 +11,6 @@ STEPS = {
     "gsv": "gsv_m3", "csw": "csw", "nsv": "nsv_m3", "mass": "mass_kg", "weight": "weight_kg",
     "rho_t": "observed_density", "shell": "shell_c", "air": "air_factor",
 }  # fmt: skip
-U_KEYS = {
-    "u_dip_mm": "u_dip", "u_tape_ppm": "u_tape", "u_water_dip_mm": "u_water",
-    "u_temperature_k": "u_temperature", "u_thermometer_k": "u_thermometer",
-    "u_ambient_k": "u_ambient", "u_density_kg_m3": "u_density", "u_sw_percent": "u_sw",
-    "u_vcf_percent": "u_vcf", "u_expansion_per_k": "u_expansion",
-}  # fmt: skip
 
 OPENING = {"dip_m": 2.317, "water_dip_m": 0.412, "temperature_c": 18.4, "ambient_c": 25.0}
 CLOSING = {"dip_m": 8.642, "water_dip_m": 0.512, "temperature_c": 31.2, "ambient_c": 29.0}

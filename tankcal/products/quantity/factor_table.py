@@ -7,6 +7,7 @@ from tankcal.job.entries import read_columns
 from tankcal.job.folder import read_csv
 from tankcal.job.tables import read_bytes
 from tankcal.messages import message
+from tankcal.tank.gauging import LIMITS
 from tankcal.tank.volume_correction.factors import FactorTable
 from tankcal.tank.volume_correction.ranges import DEGREES
 
@@ -43,7 +44,12 @@ def read_factor_table(path, base, marks, log, settings_file):
     if densities is None:
         return None
     fields = [
-        number(TEMPERATURE, "temperature of the liquid, degrees Celsius", -60, 200, required=True),
+        number(
+            TEMPERATURE,
+            "temperature of the liquid, degrees Celsius",
+            *LIMITS["temperature_c"],
+            required=True,
+        ),
         *(
             number(heading, "volume correction factor", LEAST_FACTOR, MOST_FACTOR, required=True)
             for heading in raw.headings[1:]
@@ -70,13 +76,13 @@ def _densities(raw, log):
         log.problem(raw.file, expected, raw.heading_row)
         return None
     densities = []
+    low, high = LIMITS["density_kg_m3"]
     for heading in others:
         try:
             value = float(heading.replace(",", "."))
         except ValueError:
             value = np.nan
-        is_density = 300 <= value <= 2000
-        if not is_density or (densities and value <= densities[-1]):
+        if not low <= value <= high or (densities and value <= densities[-1]):
             expected = message(
                 "factor_table_density",
                 "expected a density in kg/m3, from 300 to 2000, above that of the column before",

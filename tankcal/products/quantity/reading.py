@@ -21,7 +21,7 @@ from tankcal.products.quantity.slips import find_slips
 from tankcal.products.quantity.transfer import STATES, Transfer
 from tankcal.products.settings import read_sections
 from tankcal.record.manifest import digest_of
-from tankcal.tank.gauging import UNCERTAINTIES
+from tankcal.tank.gauging import LIMITS, UNCERTAINTIES
 from tankcal.tank.volume_correction.alcohol import Ethanol
 from tankcal.tank.volume_correction.corrections import CORRECTIONS, TABLE
 from tankcal.tank.volume_correction.factors import FactorTable
@@ -53,7 +53,7 @@ PRODUCT = (
     choice("base", "base temperature", (*BASES_C,)),
     positive("alpha_per_k", "coefficient of cubic expansion of the liquid, 1/K", 0.01),
     Field("factor_table", "text", "CSV file of factors, for correction = table"),
-    positive("density_kg_m3", "density, kg/m3", 2000),
+    positive("density_kg_m3", "density, kg/m3", LIMITS["density_kg_m3"][1]),
     choice(
         "density_is",
         message(
@@ -62,9 +62,11 @@ PRODUCT = (
         ),
         ("base", "observed"), required=True,
     ),
-    number("density_temperature_c", "temperature of the sample, degrees Celsius", -60, 200),
+    number("density_temperature_c", "temperature of the sample, degrees Celsius",
+           *LIMITS["density_temperature_c"]),
     choice("hydrometer", "glass hydrometer by its scale; blank: none", (*GLASS,)),
-    number("sw_percent", "suspended sediment and water, percent of the volume; blank: 0", 0, 20),
+    number("sw_percent", "suspended sediment and water, percent of the volume; blank: 0",
+           *LIMITS["sw_percent"]),
     positive("air_kg_m3", "density of the air for the weight in air, kg/m3; blank: 1.2", 2),
     number("weights_kg_m3", "density of the weights, kg/m3; blank: 8000", 1000, 20_000),
 )  # fmt: skip
@@ -73,11 +75,13 @@ SHELL = (
     positive("expansion_per_k", "coefficient of linear expansion, 1/K; blank: of the table", 1e-3),
 )
 GAUGING = (
-    number("dip_m", "dip of the liquid, metres", 0, 200),
-    number("ullage_m", "ullage, in place of the dip, metres", 0, 200),
-    number("water_dip_m", "dip of the free water, metres; blank: none", 0, 200),
-    number("temperature_c", "mean temperature of the liquid, degrees Celsius", -60, 200),
-    number("ambient_c", "temperature of the air, degrees Celsius", -60, 70),
+    number("dip_m", "dip of the liquid, metres", *LIMITS["dip_m"]),
+    number("ullage_m", "ullage, in place of the dip, metres", *LIMITS["ullage_m"]),
+    number("water_dip_m", "dip of the free water, metres; blank: none", *LIMITS["water_dip_m"]),
+    number(
+        "temperature_c", "mean temperature of the liquid, degrees Celsius", *LIMITS["temperature_c"]
+    ),
+    number("ambient_c", "temperature of the air, degrees Celsius", *LIMITS["ambient_c"]),
     number("pressure_kpa", "gauge pressure above the liquid, kPa; blank: 0", 0, 20_000),
     number("reference_height_m", "reference height read at the gauging, metres", 0, 200),
 )
@@ -123,7 +127,6 @@ COLDEST_HEAVY = 900.0  # kg/m3; heavier products are heated
 LEAST_SW_PERCENT = 0.005  # a smaller value is probably a fraction
 HOTTEST_AIR_C = 50.0  # a hotter air is probably in degrees Fahrenheit
 MOST_REFERENCE_SHIFT_M = 0.003  # repeatability of manual gauging, from memory
-LEAST_DENSITY = 300.0  # kg/m3; a smaller value is a relative density, or in g/cm3
 
 
 @dataclass(frozen=True)
@@ -553,7 +556,7 @@ def _product(source, correction, table):
     source.tell_each("product.density_kg_m3", np.isnan(density), lambda _: text)
     source.tell_each(
         "product.density_kg_m3",
-        density < LEAST_DENSITY,
+        density < LIMITS["density_kg_m3"][0],
         lambda ticket: message(
             "ticket_density_unit",
             "found {density:g}; expected kg/m³: is it a relative density, or in g/cm³?",

@@ -2,7 +2,7 @@
 
 from tankcal.report.plain_formulas import STEP_FORMULAS
 from tankcal.report.tables import Column, Table
-from tankcal.tank.gauging import assumed_u_vcf
+from tankcal.tank.gauging import KEY_OF_INPUT, UNITS_OF_U, assumed_u_vcf
 from tankcal.text.digits import NOTHING, fixed, format_with_u, shortest
 
 QUANTITY_UNITS = {  # in the order of the calculation
@@ -10,18 +10,6 @@ QUANTITY_UNITS = {  # in the order of the calculation
     **dict.fromkeys(("mass_kg", "weight_kg"), "kg"),
 }
 STEP_DECIMALS = {"m3": 3, "kg": 1, "kg/m3": 2, "degC": 2, "": 6}
-U_UNITS = {  # printed unit of each key of [uncertainty]
-    "u_dip_mm": "mm", "u_tape_ppm": "ppm", "u_water_dip_mm": "mm", "u_temperature_k": "K",
-    "u_thermometer_k": "K", "u_ambient_k": "K", "u_density_kg_m3": "kg/m³", "u_sw_percent": "%",
-    "u_vcf_percent": "%", "u_expansion_per_k": "1/K",
-}  # fmt: skip
-# Key of the uncertainty of each input of the budget; others come from the record.
-KEYS_OF_INPUTS = {
-    "dip": "u_dip_mm", "water dip": "u_water_dip_mm", "temperature": "u_temperature_k",
-    "tape": "u_tape_ppm", "thermometer": "u_thermometer_k", "ambient": "u_ambient_k",
-    "density": "u_density_kg_m3", "sw": "u_sw_percent", "expansion": "u_expansion_per_k",
-    "vcf": "u_vcf_percent",
-}  # fmt: skip
 _PRINTED_UNITS = {"m3": "m³", "kg/m3": "kg/m³", "degC": "°C"}
 
 
@@ -181,7 +169,7 @@ RESULTS = Table(
 
 def _u_of_input(paper, row):
     """Return the standard uncertainty of an input with its unit."""
-    key = KEYS_OF_INPUTS.get(row["input"])
+    key = KEY_OF_INPUT.get(row["input"])
     if key is None:
         return None
     value = _uncertainty(paper, key)["value"]
@@ -189,14 +177,14 @@ def _u_of_input(paper, row):
         base_c, gaugings = paper.record["base_c"], paper.record["gaugings"]
         each = [abs(100 * assumed_u_vcf(row["temperature_c"], base_c)) for row in gaugings]
         text = "; ".join(fixed(percent, 3, paper.marks) for percent in each)
-        return f"{text} {U_UNITS[key]}"
+        return f"{text} {UNITS_OF_U[key]}"
     text = shortest(value, paper.marks)
-    return f"{text} {U_UNITS[key]}"
+    return f"{text} {UNITS_OF_U[key]}"
 
 
 def origin_text(paper, row):
     """Return whether u of an input was declared, assumed or taken from the record."""
-    key = KEYS_OF_INPUTS.get(row["input"])
+    key = KEY_OF_INPUT.get(row["input"])
     origin = "record" if key is None else _uncertainty(paper, key)["origin"]
     return paper.words["origins"][origin]
 
@@ -241,7 +229,7 @@ UNCERTAINTIES = Table(
     (
         Column("name", text=lambda paper, row: row["name"], csv="name", sheet=True, width=22),
         Column("value", digits=4, csv="value", sheet=True, nothing=NOTHING),
-        Column("unit", text=lambda paper, row: U_UNITS[row["name"]], sheet=True, width=8),
+        Column("unit", text=lambda paper, row: UNITS_OF_U[row["name"]], sheet=True, width=8),
         _code("origin", "origins"),
     ),
     rows=lambda saved: saved["uncertainties"],

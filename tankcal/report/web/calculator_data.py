@@ -14,7 +14,15 @@ from tankcal.report.uncertainty.sources import critical_zone, groups_of, is_roof
 from tankcal.report.uncertainty.stated import flag_simulated, stated_rows, stated_U_m3
 from tankcal.report.web.packing import pack_numbers
 from tankcal.tank.fittings import AIR_KG_M3, WEIGHTS_KG_M3
-from tankcal.tank.gauging import UNCERTAINTIES, VCF_AT_K, VCF_PERCENT
+from tankcal.tank.gauging import (
+    FIELDS_OF_U,
+    LIMITS,
+    UNCERTAINTIES,
+    UNITS_OF_U,
+    VCF_AT_K,
+    VCF_K,
+    VCF_PERCENT,
+)
 from tankcal.tank.volume_correction import brazil, petroleum
 from tankcal.tank.volume_correction.corrections import LEAST_C, MOST_C
 from tankcal.text.digits import decimals_of_rows
@@ -22,13 +30,6 @@ from tankcal.uncertainty import coverage_factor
 
 BEND = 1e-6  # largest deviation of the factor from the line between kept rows, in largest u
 _NODES = 32  # intervals of nodes for k; the script interpolates log k over 1/dof
-# Keys of the fields, and the assumed uncertainties that they show.
-FIELDS_OF_U = {
-    "u_dip": "u_dip_mm", "u_tape": "u_tape_ppm", "u_water": "u_water_dip_mm",
-    "u_temperature": "u_temperature_k", "u_thermometer": "u_thermometer_k",
-    "u_ambient": "u_ambient_k", "u_density": "u_density_kg_m3", "u_sw": "u_sw_percent",
-    "u_expansion": "u_expansion_per_k", "u_vcf": "u_vcf_percent",
-}  # fmt: skip
 
 
 def calculator(paper):
@@ -154,8 +155,10 @@ def quantity_data(record):
         "roof": _roof_data(record),
         "air": AIR_KG_M3,
         "weights": WEIGHTS_KG_M3,
-        "u": {field: UNCERTAINTIES[name] for field, name in FIELDS_OF_U.items()},
-        "vcf_rule": {"at_k": VCF_AT_K.tolist(), "percent": VCF_PERCENT.tolist()},
+        "u": {field: UNCERTAINTIES[name] for name, field in FIELDS_OF_U.items()},
+        "units_of_u": {field: UNITS_OF_U[name] for name, field in FIELDS_OF_U.items()},
+        "input_limits": LIMITS,
+        "vcf_rule": {"at_k": VCF_AT_K.tolist(), "percent": VCF_PERCENT.tolist(), "k": VCF_K},
         "constants": _correction_constants(),
     }
 
@@ -185,6 +188,8 @@ def _correction_constants():
     }
     bounds = [float(bound) for bound in brazil.CLASSES[:-1, 0]] + [brazil.MOST]
     return {
+        "bases_c": petroleum.BASES_C,
+        "glass": petroleum.GLASS_EXPANSION,
         "groups": {
             form: {name: parts for name, (_, *parts) in groups.items()}
             for form, groups in forms.items()

@@ -23,6 +23,8 @@ BASES_C = {"15C": 15.0, "20C": 20.0, "60F": (60.0 - 32.0) / 1.8}
 BASE_NAMES = {"15C": "15 °C", "20C": "20 °C", "60F": "60 °F"}  # for readers
 WATER_1980, WATER_2004 = 999.012, 999.016  # kg/m3 at 60 degF, of the API gravity
 KPA_PER_PSI = 6.894757
+# Linear and quadratic coefficient of the reading of a glass hydrometer, per degree of its scale.
+GLASS_EXPANSION = {"15C": (23e-6, 2e-8), "20C": (23e-6, 2e-8), "60F": (12.78e-6, 6.2e-9)}
 
 MOST_ROUNDS = 200  # of the fixed-point iteration for a density at the base
 ROUNDS_OF_GROUPS = 30  # later rounds keep the group of products, so that it cannot alternate
@@ -333,8 +335,6 @@ def glass_correction(temperature_c, scale):
     >>> round(glass_correction(25.0, "15C"), 6)
     0.999768
     """
-    if scale == "60F":
-        step = 1.8 * (temperature_c - BASES_C["60F"])
-        return 1 - 0.00001278 * step - 0.0000000062 * step**2
-    step = temperature_c - BASES_C[scale]
-    return 1 - 0.000023 * step - 0.00000002 * step**2
+    linear, quadratic = GLASS_EXPANSION[scale]
+    step = (1.8 if scale == "60F" else 1.0) * (temperature_c - BASES_C[scale])
+    return 1 - linear * step - quadratic * step**2

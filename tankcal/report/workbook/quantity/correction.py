@@ -14,6 +14,8 @@ at t, or for the density at the base. VCF = exp(L(t) - L(base)), and
     dVCF / dln rho = VCF (L'(t) - L'(base)) / (1 + L'(sample))
 """
 
+import numpy as np
+
 from tankcal.report.workbook.calculator.cells import is_no_number
 from tankcal.report.workbook.quantity.rows import (
     NONE,
@@ -23,6 +25,7 @@ from tankcal.report.workbook.quantity.rows import (
     first_true,
     state_row,
 )
+from tankcal.tank.gauging import LIMITS
 from tankcal.tank.volume_correction import brazil, petroleum
 from tankcal.tank.volume_correction.corrections import LEAST_C, MOST_C
 
@@ -90,13 +93,14 @@ def checks(number):
         (f"AND({kind}={TYPED},{base}>0)", "base_other"),
         (f"AND(NOT({uses_alpha}),NOT(ISBLANK([alpha])))", "alpha_unused"),
         (f"IF({uses_alpha},{fault('[alpha]', alpha_low, alpha_high)},FALSE)", "alpha_range"),
-        (fault("[density]", 300, 2000), "density_range"),
+        (fault("[density]", *LIMITS["density_kg_m3"]), "density_range"),
         ("[density_is_code]=0", "density_is_blank"),
         (f"AND({kind}={TYPED},{is_observed})", "typed_base"),
-        (f"AND({is_observed},{fault('[sample]', -60, 200)})", "sample_blank"),
+        (f"AND({is_observed},{fault('[sample]', *LIMITS['density_temperature_c'])})",
+         "sample_blank"),
         ("AND([density_is_code]=1,OR(NOT(ISBLANK([sample])),[hydrometer_code]>0))",
          "sample_unused"),
-        (f"AND(NOT(ISBLANK([sw])),{fault('[sw]', 0, 20)})", "sw_range"),
+        (f"AND(NOT(ISBLANK([sw])),{fault('[sw]', *LIMITS['sw_percent'])})", "sw_range"),
         (f"AND({kind}={TYPED},ISBLANK([name]))", "name_blank"),
         (f"AND({kind}<>{TYPED},NOT(ISBLANK([name])))", "name_unused"),
         ("OR(COUNT([u_dip]:[u_expansion])<9,MIN([u_dip]:[u_vcf])<0,"
@@ -159,11 +163,12 @@ def _form_rows():
 
 def _glass(celsius, scale):
     """Formula of the correction of a hydrometer of a scale, as `petroleum.glass_correction`."""
-    if scale == "60F":
-        step = f"(1.8*({celsius}-{_60F_C}))"
-        return f"(1-0.00001278*{step}-0.0000000062*{step}^2)"
+    linear, quadratic = (
+        np.format_float_positional(value, trim="-") for value in petroleum.GLASS_EXPANSION[scale]
+    )
     step = f"({celsius}-{petroleum.BASES_C[scale]!r})"
-    return f"(1-0.000023*{step}-0.00000002*{step}^2)"
+    step = f"(1.8*{step})" if scale == "60F" else step
+    return f"(1-{linear}*{step}-{quadratic}*{step}^2)"
 
 
 def _degrees(celsius):

@@ -8,7 +8,7 @@ from tankcal.report.workbook.calculator.table import Table
 from tankcal.report.workbook.look import ACCENT, INPUT, LINE_PT, MUTED, number_format
 from tankcal.report.workbook.quantity import correction, gauging, uncertainty
 from tankcal.report.workbook.quantity.rows import NONE, STATES
-from tankcal.tank.gauging import UNCERTAINTIES
+from tankcal.tank.gauging import FIELDS_OF_U, UNCERTAINTIES, UNITS_OF_U
 from tankcal.text.digits import NOTHING, fixed, shortest
 from tankcal.text.words import marks_of
 
@@ -63,22 +63,10 @@ _GAUGING = (
     Input("ambient", digits=2, unit="°C"),
     Input("factor", digits=6),
 )
-_UNITS_OF_U = {
-    "u_dip_mm": "mm", "u_tape_ppm": "ppm", "u_water_dip_mm": "mm", "u_temperature_k": "K",
-    "u_thermometer_k": "K", "u_ambient_k": "K", "u_density_kg_m3": "kg/m³", "u_sw_percent": "%",
-    "u_expansion_per_k": "1/K", "u_vcf_percent": "%",
-}  # fmt: skip
-# Keys of the cells, in an order with the optional u of VCF at the end.
-_KEYS_OF_U = {
-    "u_dip_mm": "u_dip", "u_tape_ppm": "u_tape", "u_water_dip_mm": "u_water",
-    "u_temperature_k": "u_temperature", "u_thermometer_k": "u_thermometer",
-    "u_ambient_k": "u_ambient", "u_density_kg_m3": "u_density", "u_sw_percent": "u_sw",
-    "u_expansion_per_k": "u_expansion", "u_vcf_percent": "u_vcf",
-}  # fmt: skip
 _U = tuple(
     Input(key, digits="0.0E+00" if name == "u_expansion_per_k" else "0.0##",
-          unit=_UNITS_OF_U[name], value=UNCERTAINTIES[name])
-    for name, key in _KEYS_OF_U.items()
+          unit=UNITS_OF_U[name], value=UNCERTAINTIES[name])
+    for name, key in FIELDS_OF_U.items()
 )  # fmt: skip
 # Results: key of the label, cell of each state or of both, digits, unit.
 _STEPS = (

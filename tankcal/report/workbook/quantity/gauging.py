@@ -6,6 +6,7 @@ from tankcal.report.uncertainty.sources import is_roof_in_table, roof_of
 from tankcal.report.workbook.quantity.correction import FACTORS, TYPED, factor_rows
 from tankcal.report.workbook.quantity.rows import NONE, fault, first_true, state_row
 from tankcal.tank.fittings import AIR_KG_M3, WEIGHTS_KG_M3
+from tankcal.tank.gauging import LIMITS
 
 BLANK = ("opening_blank", "closing_blank")  # sentences of a blank opening and closing
 _FIRST, _LAST = "INDEX(capacity_height,1)", "INDEX(capacity_height,ROWS(capacity_height))"
@@ -28,13 +29,19 @@ def _guard(expression, state="level_state"):
     return f"IF([{state}@]=#fine,{expression},{NONE})"
 
 
+def _fault(key, name):
+    """Condition that a cell of a gauging contains no number within the limits of a ticket."""
+    return fault(f"[{key}@]", *LIMITS[name])
+
+
 def _levels(record, number):
     """Rows of the dip, and of the state of dips and temperatures."""
     reference = record["job"]["datum"]["reference_height_m"]
     roof = roof_of(record) if record["roof"] else None
     ullage = f"{reference!r}-[ullage@]" if reference is not None else "-1"
     level = f"IF(ISBLANK([ullage@]),[dip@],{ullage})"
-    dip = f"IF(ISBLANK([ullage@]),{fault('[dip@]', 0, 200)},{fault('[ullage@]', 0, 200)})"
+    dip = f"IF(ISBLANK([ullage@]),{_fault('dip', 'dip_m')},{_fault('ullage', 'ullage_m')})"
+    ambient = _fault("ambient", "ambient_c")
     cases = [
         ("AND(NOT(ISBLANK([dip@])),NOT(ISBLANK([ullage@])))", "dip_and_ullage"),
         ("AND(ISBLANK([dip@]),ISBLANK([ullage@]))", "no_dip"),
@@ -42,16 +49,16 @@ def _levels(record, number):
         *([] if reference is not None else [("NOT(ISBLANK([ullage@]))", "no_reference")]),
         (f"OR([level@]<{_FIRST},[level@]>{_LAST})", "outside_table"),
         *([(f"[level@]<{roof['roof_critical_top']!r}", "critical")] if roof else []),
-        (f"AND(NOT(ISBLANK([water@])),{fault('[water@]', 0, 200)})", "no_number"),
+        (f"AND(NOT(ISBLANK([water@])),{_fault('water', 'water_dip_m')})", "no_number"),
         ("[water@]>=[level@]", "water_above"),
         *(
             [(f"[water@]>{roof['roof_critical_bottom']!r}", "water_at_roof")]
             if roof and is_roof_in_table(record)
             else []
         ),
-        (fault("[liquid@]", -60, 200), "liquid_blank"),
-        (f"IF([insulated_code]=1,FALSE,{fault('[ambient@]', -60, 70)})", "ambient_blank"),
-        (f"AND(NOT(ISBLANK([ambient@])),{fault('[ambient@]', -60, 70)})", "no_number"),
+        (_fault("liquid", "temperature_c"), "liquid_blank"),
+        (f"IF([insulated_code]=1,FALSE,{ambient})", "ambient_blank"),
+        (f"AND(NOT(ISBLANK([ambient@])),{ambient})", "no_number"),
     ]
     blank = "AND(" + ",".join(
         f"ISBLANK([{key}@])" for key in ("dip", "ullage", "water", "liquid", "ambient", "factor")

@@ -12,7 +12,7 @@ from tankcal.report.workbook.calculator.coverage import normal, student
 from tankcal.report.workbook.quantity.correction import TYPED
 from tankcal.report.workbook.quantity.rows import NONE, STATES, Cell, Row, state_row
 from tankcal.tank.fittings import AIR_KG_M3, WEIGHTS_KG_M3
-from tankcal.tank.gauging import VCF_AT_K, VCF_PERCENT
+from tankcal.tank.gauging import VCF_AT_K, VCF_K, VCF_PERCENT
 from tankcal.uncertainty import least_of
 
 QUANTITIES = ("tov", "gov", "gsv", "nsv", "mass", "weight")
@@ -39,7 +39,7 @@ def _scale():
         line = f"{low_u!r}+({distance}-{low!r})*{high_u - low_u!r}/{high - low!r}"
         # The last slope goes on beyond the last point.
         formula = f"IF({distance}<{high!r},{line},{formula})" if formula else line
-    rule = f"SIGN([liquid@]-[t_b])*({formula})/100/1.96"
+    rule = f"SIGN([liquid@]-[t_b])*({formula})/100/{VCF_K!r}"
     scale = f"IF(ISBLANK([u_vcf]),{rule},[u_vcf]/100)"
     return [state_row("scale", "u(VCF)/VCF", f"IF([state@]=#fine,{scale},0)", 0)]
 
