@@ -15,6 +15,7 @@ from tankcal.batch.options import FOLDERS, STEPS
 from tankcal.errors import InputError
 from tankcal.record import manifest
 from tankcal.report.batch import OF_RULE, STATUSES
+from tankcal.report.folders import replace_file
 from tankcal.text.words import load_words
 
 JOBS, FILE, FORMAT = "jobs", "outcome.json", "tankcal-outcome/1"
@@ -145,15 +146,13 @@ def save_outcome(out, outcome):
 
 def _write_whole(path, text):
     """Write a text file to the disk by replacing it with a complete temporary file."""
-    waiting = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        with waiting.open("w", encoding="utf-8", errors="replace", newline="\n") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        waiting.replace(path)
-    finally:
-        waiting.unlink(missing_ok=True)
+    with (
+        replace_file(path) as waiting,
+        waiting.open("w", encoding="utf-8", errors="replace", newline="\n") as file,
+    ):
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def read_known_names(out):

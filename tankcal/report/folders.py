@@ -79,6 +79,23 @@ def refuse_foreign(directory, known):
 
 
 @contextmanager
+def replace_file(path):
+    """Yield the path of a temporary file, which replaces a file if the block succeeds.
+
+    An OSError names the file of the user instead of the temporary file.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        yield temporary
+        temporary.replace(path)
+    except OSError as error:
+        raise type(error)(error.errno, error.strerror, str(path)) from error
+    finally:
+        with suppress(OSError):  # replaced, or never created
+            temporary.unlink()
+
+
+@contextmanager
 def replace_folder(directory, language=None):
     """Context manager of a new folder that replaces `directory` if the block ends without error.
 

@@ -4,7 +4,6 @@ The chart is for the wall of a fuel station, where a dip stick is read in whole 
 between two rows of the table are interpolated linearly and rounded to litres once.
 """
 
-import hashlib
 import math
 from pathlib import Path
 
@@ -13,7 +12,9 @@ import numpy as np
 from tankcal import record as records
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
+from tankcal.record.manifest import digest_of
 from tankcal.report import blocks
+from tankcal.report.folders import replace_file
 from tankcal.report.plain import PlainPaper
 from tankcal.report.uncertainty.sources import critical_zone
 from tankcal.report.uncertainty.stated import k_of_rows, stated_U_m3
@@ -77,16 +78,11 @@ def write_chart(source, out, language=None, product=None, step_cm=1, *, by_ullag
             count=len(rows), most=MOST_ROWS,
         )  # fmt: skip
         raise InputError(Problem("--step-cm", text))
-    digest = hashlib.sha256(source.read_bytes()).hexdigest()
     language = language or language_of(record)
-    shown = pages(record, rows, language, product, digest, by_ullage=by_ullage)
+    shown = pages(record, rows, language, product, digest_of(source), by_ullage=by_ullage)
     content = pdf([block.data for block in shown], source.parent)
-    temporary = Path(out).with_name(f".{Path(out).name}.tmp")
-    try:
+    with replace_file(Path(out)) as temporary:
         temporary.write_bytes(content)
-        temporary.replace(out)
-    finally:
-        temporary.unlink(missing_ok=True)
     return len(rows)
 
 

@@ -213,3 +213,21 @@ def test_faults_while_nothing_was_there(tmp_path, kind):
         if status == 0:
             break
     assert status == 0
+
+
+def test_a_file_is_replaced_as_a_whole_or_not(tmp_path):
+    path = tmp_path / "chart.pdf"
+    path.write_text("earlier")
+
+    def fill_the_disk():
+        with folders.replace_file(path) as temporary:
+            temporary.write_text("half")
+            raise OSError(errno.ENOSPC, "No space left", str(temporary))
+
+    with pytest.raises(OSError, match=r"chart\.pdf'$"):
+        fill_the_disk()
+    assert [file.name for file in tmp_path.iterdir()] == ["chart.pdf"]
+    assert path.read_text() == "earlier"
+    with folders.replace_file(path) as temporary:
+        temporary.write_text("new")
+    assert [file.read_text() for file in tmp_path.iterdir()] == ["new"]

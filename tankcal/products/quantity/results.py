@@ -1,7 +1,6 @@
 """Results of tickets: one row for each ticket, and the comparison with the other party."""
 
 import os
-from contextlib import suppress
 from dataclasses import dataclass
 from errno import EISDIR
 
@@ -10,6 +9,7 @@ import numpy as np
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.products.quantity.chain import QUANTITIES, values_of
+from tankcal.report.folders import replace_file
 from tankcal.text.delimited import write_guarded
 
 # First columns of `rows_of`, which identify a file that may be replaced.
@@ -114,13 +114,8 @@ def check_output(path):
 def write_rows(path, rows):
     """Write the rows of `rows_of` to a CSV file, as a whole or not."""
     check_output(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        with temporary.open("w", encoding="utf-8", newline="") as stream:
-            write_guarded(stream, [[*rows[0]], *(row.values() for row in rows)])
-        temporary.replace(path)
-    except OSError as error:  # names the file of the user instead of the temporary file
-        raise type(error)(error.errno, error.strerror, str(path)) from error
-    finally:
-        with suppress(OSError):  # replaced, or never created
-            temporary.unlink()
+    with (
+        replace_file(path) as temporary,
+        temporary.open("w", encoding="utf-8", newline="") as stream,
+    ):
+        write_guarded(stream, [[*rows[0]], *(row.values() for row in rows)])
