@@ -47,3 +47,19 @@ def read_sections(source, sections, log, name=None):
         values[section] = read_section(name, section, fields, entries, rows.get(section), log)
         places |= {f"{section}.{key}": entry.row for key, entry in entries.items()}
     return values, places, marks
+
+
+def drop_blanks(sections):
+    """Sections with their filled keys only: {section: {key: value}}."""
+    filled = {
+        section: {key: value for key, value in values.items() if value is not None}
+        for section, values in sections.items()
+    }
+    return {section: values for section, values in filled.items() if values}
+
+
+def fill_blanks(values, defaults):
+    """Values of the keys of `defaults`, which replace blank values: {key: value}."""
+    return {
+        key: default if values[key] is None else values[key] for key, default in defaults.items()
+    }

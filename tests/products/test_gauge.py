@@ -25,7 +25,7 @@ from tankcal.products.gauge.deviation import (
     tilt_of_slope,
 )
 from tankcal.products.gauge.paper import DOCUMENT, GaugePaper
-from tankcal.products.gauge.reading import UNCERTAINTIES, read_comparison
+from tankcal.products.gauge.reading import UNCERTAINTIES, read_comparison, shell_of
 from tankcal.products.gauge.starter import write_starter
 from tankcal.record.schema import to_plain
 from tankcal.report.verification import verify
@@ -341,9 +341,8 @@ def test_movement_of_a_gauge_on_the_shell(tmp_path, record_folder):
         "id"
     ]
     first = read_comparison(write(tmp_path / "a", gauge=on_shell, liquid={"density_kg_m3": 850}))
-    tank = first.tank
     levels = np.array([1.0, 3.0, 5.0, 8.0])
-    moved = shortening_m(levels, tank.courses, 850, tank.e_pa, tank.zero_m)
+    moved = shortening_m(levels, *shell_of(first.tank, 850))
     rows = [(n, x, x + h) for n, (x, h) in enumerate(zip(levels, moved, strict=True))]
     folder = write(tmp_path / "b", rows, gauge=on_shell, liquid={"density_kg_m3": 850})
     gauge = computed(folder)

@@ -8,7 +8,6 @@ from tankcal.adjust import CRITICAL
 from tankcal.errors import Problem
 from tankcal.exports.exporting import gauge_correction, shortening_m
 from tankcal.gum.components import Source
-from tankcal.gum.coverage import coverage_factor
 from tankcal.inspection.verdict import probability_of, verdict_of
 from tankcal.messages import message
 from tankcal.products.gauge import saved
@@ -23,9 +22,10 @@ from tankcal.products.gauge.reading import (
     LEAST_RANGE,
     READINGS,
     SETTINGS,
-    TAPE_EXPANSION_PER_K,
-    TAPE_REFERENCE_C,
+    TAPE,
+    shell_of,
 )
+from tankcal.products.settings import drop_blanks, fill_blanks
 from tankcal.record.texts import warnings_of
 
 STEPS_M = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)  # between two rows of the corrections
@@ -50,8 +50,6 @@ def commission(comparison):
     zeros, zero_columns = _zeros(comparison, line)
     declared = comparison.sections
     reference, table_reference = _reference_heights(comparison)
-    k_normal = float(coverage_factor(comparison.probability, np.inf))
-    tape = declared["tape"]
     return saved.GaugeFile(
         notice=declared["certificate"]["notice"] or (comparison.tank.notice if comparison.tank
                                                      else ""),
@@ -59,8 +57,7 @@ def commission(comparison):
         coverage_probability=comparison.probability,
         certificate=saved.GaugeCertificate(
             **{name: declared["certificate"][name] for name in
-               ("number", "by", "place", "customer", "note", "language")},
-            date=str(declared["certificate"]["date"]),
+               ("number", "date", "by", "place", "customer", "note", "language")},
         ),
         gauge=saved.GaugeInstrument(
             **{name: declared["gauge"][name] for name in
@@ -69,21 +66,18 @@ def commission(comparison):
             corrects_head=bool(declared["gauge"]["corrects_head"]),
         ),
         tape=saved.GaugeTape(
-            serial=tape["serial"],
-            certificate=tape["certificate"],
-            zero_correction_mm=_or(tape["zero_correction_mm"], 0.0),
-            scale_correction_ppm=_or(tape["scale_correction_ppm"], 0.0),
-            expansion_per_k=_or(tape["expansion_per_k"], TAPE_EXPANSION_PER_K),
-            reference_temperature_c=_or(tape["reference_temperature_c"], TAPE_REFERENCE_C),
+            serial=declared["tape"]["serial"],
+            certificate=declared["tape"]["certificate"],
+            **fill_blanks(declared["tape"], TAPE),
         ),
         liquid=declared["liquid"]["name"],
         reference_height_m=reference,
-        U_reference_mm=None if reference is None else k_normal * comparison.u["u_reference_mm"],
+        U_reference_mm=None if reference is None else zeros[-1].U_mm,
         table_reference_height_m=table_reference,
         levels=levels,
         line=_line(comparison, line),
         zeros=zeros,
-        head=_head(comparison, k_normal),
+        head=_head(comparison),
         corrections=_corrections(comparison, line, zeros[1].z_mm, zero_columns),
         budget=_budget(comparison, line),
         uncertainties=[
@@ -91,30 +85,12 @@ def commission(comparison):
             for name, value in comparison.u.items()
         ],
         decision=_decision(declared["limit"], levels),
-        record=record_of(comparison.tank),
-        inputs=inputs_of(comparison.sections),
+        record=comparison.tank,
+        inputs=drop_blanks(declared),
         readings=readings_of(comparison.table),
         files=[saved.GaugeSource(*file) for file in comparison.files],
         warnings=warnings_of([*comparison.warnings, *_warnings(comparison, line, zeros)]),
     )  # fmt: skip
-
-
-def record_of(tank):
-    """`saved.GaugeRecord` of `reading.TankFacts`; None: no record."""
-    if tank is None:
-        return None
-    courses = [saved.GaugeCourse(*course) for course in tank.courses]
-    return saved.GaugeRecord(tank.digest, tank.tank, tank.reference_height_m, tank.zero_m, courses,
-                             tank.e_pa, tank.notice)  # fmt: skip
-
-
-def inputs_of(sections):
-    """Sections of gauge.toml without blank keys."""
-    filled = {
-        section: {key: value for key, value in values.items() if value is not None}
-        for section, values in sections.items()
-    }
-    return {section: values for section, values in filled.items() if values}
 
 
 def readings_of(table):
@@ -123,10 +99,6 @@ def readings_of(table):
         saved.GaugeReading(row, **record)
         for row, record in zip(table.rows, table.records(), strict=True)
     ]
-
-
-def _or(value, default):
-    return default if value is None else value
 
 
 def _movement(comparison, level_m):
@@ -148,8 +120,8 @@ def _levels(comparison, line):
         bound = probability = verdict = None
         if has_limit:
             # The larger of both limits applies, as is usual for gauges.
-            relative = 10 * _or(limit["relative_percent"], 0.0) * float(dips.level_m[row])
-            bound = max(_or(limit["absolute_mm"], 0.0), relative)
+            relative = 10 * (limit["relative_percent"] or 0.0) * float(dips.level_m[row])
+            bound = max(limit["absolute_mm"] or 0.0, relative)
             probability = probability_of(deviation, MM * u[row], bound, dof[row])
             guard = MM * float(U[row]) if limit["rule"] == "guarded" else 0.0
             verdict = verdict_of(deviation, guard, bound)
@@ -164,17 +136,13 @@ def _levels(comparison, line):
                 U_mm=MM * float(U[row]),
                 k=float(k[row]),
                 residual_mm=MM * float(line.residuals_m[row]),
-                w=_or_none(line.w[row]),
+                w=float(line.w[row]),
                 limit_mm=bound,
                 probability=probability,
                 verdict=verdict,
             )
         )
     return levels
-
-
-def _or_none(value):
-    return float(value) if np.isfinite(value) else None
 
 
 def _decision(limit, levels):
@@ -191,7 +159,7 @@ def _line(comparison, line):
     probability, gauge = comparison.probability, comparison.sections["gauge"]
     _, U, _, k = expand(line.sources, probability)
     slope = float(line.unknowns[1])
-    k_normal = float(coverage_factor(probability, np.inf))
+    k_normal = comparison.k_normal
     pipe = U_pipe = scale = U_scale = tilt = kind = low = high = None
     of_slope = [replace(s, columns_m3=s.columns_m3[1:]) for s in line.sources]
     if comparison.sections["pipe"]["tilt_deg"] is not None:
@@ -206,8 +174,8 @@ def _line(comparison, line):
     if line.is_slope_estimated:
         is_known = gauge["scale_ppm"] is not None
         kind = "estimated" if is_known else "equivalent"
-        part = slope - _or(gauge["scale_ppm"], 0.0) * 1e-6
-        u_scale = _or(gauge["u_scale_ppm"], 0.0) * 1e-6
+        part = slope - (gauge["scale_ppm"] or 0.0) * 1e-6
+        u_scale = (gauge["u_scale_ppm"] or 0.0) * 1e-6
         U_part = _expand_slope([*of_slope, Source("scale", np.array([[u_scale]]))], probability)
         tilt, low, high = (
             float(np.degrees(tilt_of_slope(value)))
@@ -223,8 +191,8 @@ def _line(comparison, line):
         U_slope_mm_per_m=MM * float(U[1]),
         k_slope=float(k[1]),
         dof=line.dof,
-        sigma0=_or_none(line.sigma0),
-        probability=_or_none(line.probability),
+        sigma0=line.sigma0,
+        probability=line.probability,
         is_scatter_estimated=line.is_scatter_estimated,
         pipe_mm_per_m=None if pipe is None else MM * pipe,
         U_pipe_mm_per_m=None if pipe is None else MM * U_pipe,
@@ -253,7 +221,7 @@ def _reference_heights(comparison):
 def _zeros(comparison, line):
     """(`GaugeZero`s above the dip plate, {source: effect of u on -z of the table, m})."""
     u, declared = comparison.u, comparison.sections["zeros"]
-    k = float(coverage_factor(comparison.probability, np.inf))
+    k = comparison.k_normal
     reference, table_reference = _reference_heights(comparison)
     columns, z_table, source = {}, None, "unknown"
     if declared["table_zero_m"] is not None:
@@ -268,10 +236,7 @@ def _zeros(comparison, line):
         }
     U_table = k * MM * float(np.linalg.norm([*columns.values()])) if columns else None
     # The gauge indicates 0 where L + D(L) = 0.
-    level = np.zeros(1)
-    for _ in range(3):
-        deviation, sources = line.at(level, _movement(comparison, level))
-        level = -deviation
+    level, _, sources = _at_indications(comparison, line, np.zeros(1))
     U_gauge = MM * float(expand(sources, comparison.probability)[1][0])
     zeros = [
         saved.GaugeZero("dip_plate", 0.0, 0.0, "definition"),
@@ -284,14 +249,20 @@ def _zeros(comparison, line):
     return zeros, columns
 
 
+def _at_indications(comparison, line, indication):
+    """(levels, deviations, sources) at indications; the deviation is a function of the level."""
+    level = indication
+    for _ in range(3):
+        deviation, sources = line.at(level, _movement(comparison, level))
+        level = indication - deviation
+    return level, deviation, sources
+
+
 def _corrections(comparison, line, z_table_mm, zero_columns):
     """`GaugeCorrection`s over the levels in use."""
     gauge, dips = comparison.sections["gauge"], comparison.dips
     indication = _indications(gauge["lowest_m"], gauge["highest_m"])
-    level = indication
-    for _ in range(3):  # D is needed at the level, not at the indication
-        deviation, sources = line.at(level, _movement(comparison, level))
-        level = indication - deviation
+    level, deviation, sources = _at_indications(comparison, line, indication)
     _, U, _, k = expand(sources, comparison.probability)
     to_table = [None] * len(level)
     U_table = [None] * len(level)
@@ -341,18 +312,17 @@ def _budget(comparison, line):
     rows = []
     for source in sources:
         u = MM * np.linalg.norm(source.columns_m3, axis=1)
-        dof = None if np.isinf(source.dof) else float(source.dof)
-        rows.append(saved.GaugeContribution(source.kind, *map(float, u), dof))
+        rows.append(saved.GaugeContribution(source.kind, *map(float, u), source.dof))
     return sorted(rows, key=lambda row: -max(row.low_mm, row.middle_mm, row.high_mm))
 
 
-def _head(comparison, k_normal):
+def _head(comparison):
     """`GaugeHead` of a gauge that the shell carries; None without courses or density."""
     gauge, tank = comparison.sections["gauge"], comparison.tank
     density = comparison.sections["liquid"]["density_kg_m3"]
     if gauge["supported_by"] != "shell" or tank is None or not tank.courses or density is None:
         return None
-    shell = (tank.courses, density, tank.e_pa, tank.zero_m)
+    shell = shell_of(tank, density)
     best = gauge_correction(gauge["highest_m"], *shell)
     top = MM * float(shortening_m([gauge["highest_m"]], *shell)[0])
     share = comparison.u["u_movement_percent"] / 100
@@ -360,7 +330,7 @@ def _head(comparison, k_normal):
         is_modelled=comparison.movement is not None,
         density_kg_m3=density,
         top_mm=top,
-        U_top_mm=k_normal * share * top,
+        U_top_mm=comparison.k_normal * share * top,
         start_m=best.start_m,
         factor_mm_per_m=MM * best.factor,
         off_mm=MM * best.off_m,
@@ -398,8 +368,8 @@ def _warnings(comparison, line, zeros):
     heights = _reference_heights(comparison)
     if None not in heights:
         moved = MM * (heights[0] - heights[1])
-        k = float(coverage_factor(comparison.probability, np.inf))
-        U = k * np.hypot(comparison.u["u_reference_mm"], comparison.u["u_table_reference_mm"])
+        u = np.hypot(comparison.u["u_reference_mm"], comparison.u["u_table_reference_mm"])
+        U = comparison.k_normal * u
         if abs(moved) > U:
             text = message("gauge_reference_moved", "the reference height differs from that of the "
                            "table by {moved:+.1f} mm, U = {U:.1f} mm: dip plate or reference "

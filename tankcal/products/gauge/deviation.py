@@ -102,8 +102,6 @@ class Line:
         The residuals alone determine the scatter, because they contradict the declaration.
     is_slope_estimated : bool
         False: the slope is a declared value.
-    hytd_share : float
-        Relative standard uncertainty of the movement h.
     """
 
     mean_level_m: float

@@ -9,6 +9,7 @@ from tankcal import record as records
 from tankcal.adjust import CRITICAL
 from tankcal.errors import InputError, Problem
 from tankcal.exports.exporting import shortening_m
+from tankcal.gum.coverage import coverage_factor
 from tankcal.job.checking import missing_beside
 from tankcal.job.contract.keys import CSV
 from tankcal.job.contract.shorthand import choice, number, positive
@@ -18,7 +19,8 @@ from tankcal.job.folder import read_csv
 from tankcal.job.tables import Log, make_table, read_bytes, shown
 from tankcal.messages import message
 from tankcal.products.gauge.deviation import LEAST_LEVELS, Dips, KnownSlope, slope_of_tilt
-from tankcal.products.settings import read_sections
+from tankcal.products.gauge.saved import GaugeCourse, GaugeRecord
+from tankcal.products.settings import fill_blanks, read_sections
 from tankcal.record.manifest import digest_of
 from tankcal.tank import gauging
 from tankcal.text.shipped import LANGUAGES
@@ -45,8 +47,12 @@ UNCERTAINTIES = {
     "u_table_zero_mm": 1.0,
     "u_movement_percent": 20.0,
 }
-TAPE_EXPANSION_PER_K = 1.15e-5  # steel, from memory
-TAPE_REFERENCE_C = 20.0
+TAPE = {  # if gauge.toml does not declare them
+    "zero_correction_mm": 0.0,
+    "scale_correction_ppm": 0.0,
+    "expansion_per_k": 1.15e-5,  # steel, from memory
+    "reference_temperature_c": 20.0,
+}
 
 
 def _text(name):
@@ -103,35 +109,6 @@ COLUMNS = (
 
 
 @dataclass(frozen=True)
-class TankFacts:
-    """Facts of the tank from its record.
-
-    Attributes
-    ----------
-    tank, digest : str
-        Name of the tank, and SHA-256 of the record.
-    reference_height_m : float or None
-        Height of the reference point above the zero of the table.
-    zero_m : float
-        Height of the zero of the table above the bottom.
-    courses : tuple of (height_m, thickness_m, radius_m)
-        Courses from the bottom up; (): none.
-    e_pa : float
-        Young's modulus of the shell.
-    notice : str
-        Notice on every page of its certificate, such as EXAMPLE; "": none.
-    """
-
-    tank: str
-    digest: str
-    reference_height_m: float | None
-    zero_m: float
-    courses: tuple
-    e_pa: float
-    notice: str
-
-
-@dataclass(frozen=True)
 class Comparison:
     """Checked input of a commissioning.
 
@@ -143,7 +120,8 @@ class Comparison:
         Readings as in readings.csv.
     u : dict
         {name: standard uncertainty}, declared or assumed.
-    tank : TankFacts or None
+    tank : saved.GaugeRecord or None
+        Facts of the tank from its record.
     names : tuple of str
         Name of each level, from the lowest level.
     counts : ndarray, shape (n,)
@@ -161,7 +139,7 @@ class Comparison:
     sections: dict
     table: ColumnValues
     u: dict
-    tank: TankFacts | None
+    tank: GaugeRecord | None
     names: tuple
     counts: np.ndarray
     dips: Dips
@@ -174,6 +152,11 @@ class Comparison:
     def probability(self):
         """Coverage probability of all U."""
         return self.sections["certificate"]["coverage_probability"] or 0.95
+
+    @property
+    def k_normal(self):
+        """Coverage factor of a standard uncertainty with infinite degrees of freedom."""
+        return float(coverage_factor(self.probability, np.inf))
 
 
 def read_comparison(folder):
@@ -244,7 +227,8 @@ def read_saved_comparison(inputs, readings, tank, files):
         {section: {key: value}} of gauge.toml, without blank keys.
     readings : list of dict
         {column: value} of each row of readings.csv, with its number "row".
-    tank : TankFacts or None
+    tank : saved.GaugeRecord or None
+        Facts of the tank from its record.
     files : tuple of (str, str)
         Name and SHA-256 of gauge.toml and readings.csv.
 
@@ -277,12 +261,9 @@ def _compare(source, table, tank, files):
     sections, log = source.sections, source.log
     log.stop_if_problems()
     _check_settings(source, tank)
-    lengths, by_ullage = _check_readings(source, table, log)
+    lengths, by_ullage = _check_readings(source, table)
     log.stop_if_problems()
-    u = {
-        name: assumed if sections["uncertainty"][name] is None else sections["uncertainty"][name]
-        for name, assumed in UNCERTAINTIES.items()
-    }
+    u = fill_blanks(sections["uncertainty"], UNCERTAINTIES)
     if (
         sections["uncertainty"]["u_tape_temperature_k"] is None
         and np.isnan(table.numbers("tape_c")).any()
@@ -310,7 +291,7 @@ class _Source:
 
 
 def _tank(source, folder):
-    """`TankFacts` of the record; None without a record, or after a problem."""
+    """`GaugeRecord` of the record; None without a record, or after a problem."""
     name = source.sections["gauge"]["record"]
     if name is None:
         if source.sections["gauge"]["tank"] is None:
@@ -338,7 +319,7 @@ def _tank(source, folder):
 
 
 def read_tank(path):
-    """Read the `TankFacts` of a record.json; None for a record without a capacity table.
+    """Read the `GaugeRecord` of a record.json; None for a record without a capacity table.
 
     Raises
     ------
@@ -348,17 +329,24 @@ def read_tank(path):
     record = records.read(path, tables=False)
     if record.capacity is None:
         return None
-    courses = [(c.height_m, c.thickness_m, c.inside_radius_m) for c in record.courses]
-    is_known = bool(courses) and min(thickness for _, thickness, _ in courses) > 0
-    return TankFacts(
-        record.job.tank.id,
+    are_known = all(course.thickness_m > 0 for course in record.courses)
+    return GaugeRecord(
         digest_of(path),
+        record.job.tank.id,
         record.job.datum.reference_height_m,
         record.capacity.zero_m,
-        tuple(courses) if is_known else (),
+        [GaugeCourse(c.height_m, c.thickness_m, c.inside_radius_m) for c in record.courses]
+        if are_known
+        else [],
         record.job.material.e_pa,
         str(record.job.certificate.get("notice") or ""),
     )
+
+
+def shell_of(tank, density):
+    """Arguments of `shortening_m` and `gauge_correction` after the level."""
+    courses = [(course.height_m, course.thickness_m, course.radius_m) for course in tank.courses]
+    return courses, density, tank.e_pa, tank.zero_m
 
 
 def _check_settings(source, tank):
@@ -378,27 +366,24 @@ def _check_settings(source, tank):
             source.tell(f"limit.{key}", missing_beside("limit.absolute_mm"))
     if not has_limit and (limit["source"] is not None or limit["rule"] is not None):
         source.tell("limit.absolute_mm", missing_beside("limit.source"))
-    for section, value, u in (
+    for section, first, second in (
         ("pipe", "tilt_deg", "u_tilt_deg"),
         ("gauge", "scale_ppm", "u_scale_ppm"),
+        ("zeros", "dip_plate_m", "table_zero_m"),
     ):
         values = source.sections[section]
-        if (values[value] is None) != (values[u] is None):
-            lacking, other = (u, value) if values[u] is None else (value, u)
+        if (values[first] is None) != (values[second] is None):
+            lacking, other = (second, first) if values[second] is None else (first, second)
             source.tell(f"{section}.{lacking}", missing_beside(f"{section}.{other}"))
     if pipe["tilt_deg"] is not None and gauge["supported_by"] == "shell":
         text = message("gauge_pipe_of_shell", "given for a gauge without a still pipe on the "
                        "bottom: the angle of any other pipe", )  # fmt: skip
         source.tell("pipe.tilt_deg", text, is_warning=True)
-    zeros = source.sections["zeros"]
-    if (zeros["dip_plate_m"] is None) != (zeros["table_zero_m"] is None):
-        lacking = "dip_plate_m" if zeros["dip_plate_m"] is None else "table_zero_m"
-        other = "table_zero_m" if lacking == "dip_plate_m" else "dip_plate_m"
-        source.tell(f"zeros.{lacking}", missing_beside(f"zeros.{other}"))
 
 
-def _check_readings(source, table, log):
+def _check_readings(source, table):
     """(corrected tape readings (rows,), whether each is an ullage)."""
+    log = source.log
     if table.is_empty:
         log.problem(READINGS, message("gauge_no_readings", "no rows; expected a dip and an "
                     "indication of the gauge in each row"))  # fmt: skip
@@ -414,17 +399,13 @@ def _check_readings(source, table, log):
     by_ullage = np.isfinite(ullage)
     if by_ullage.any() and source.sections["reference"]["height_m"] is None:
         source.tell("reference.height_m", missing_beside(f"{READINGS}, ullage_m"))
-    tape = source.sections["tape"]
+    tape = fill_blanks(source.sections["tape"], TAPE)
+    # Without a temperature, the reading is not corrected for it.
+    warmer = np.nan_to_num(table.numbers("tape_c") - tape["reference_temperature_c"])
+    scale = tape["scale_correction_ppm"] * 1e-6 + tape["expansion_per_k"] * warmer
     reading = np.where(by_ullage, ullage, dip)
-    start = tape["reference_temperature_c"]
-    warmer = table.numbers("tape_c") - (TAPE_REFERENCE_C if start is None else start)
-    scale = (tape["scale_correction_ppm"] or 0.0) * 1e-6 + _expansion(tape) * np.nan_to_num(warmer)
-    # An empty reading at the liquid is true length = reading (1 + scale) + zero correction.
-    return reading * (1 + scale) + (tape["zero_correction_mm"] or 0.0) / 1000, by_ullage
-
-
-def _expansion(tape):
-    return TAPE_EXPANSION_PER_K if tape["expansion_per_k"] is None else tape["expansion_per_k"]
+    # true length = reading (1 + scale) + zero correction
+    return reading * (1 + scale) + tape["zero_correction_mm"] / 1000, by_ullage
 
 
 def _movement(source, tank, by_ullage):
@@ -447,7 +428,8 @@ def _movement(source, tank, by_ullage):
     if density is None:
         source.tell("liquid.density_kg_m3", missing_beside("gauge.supported_by = shell"))
         return None
-    return lambda level: shortening_m(level, tank.courses, density, tank.e_pa, tank.zero_m)
+    shell = shell_of(tank, density)
+    return lambda level: shortening_m(level, *shell)
 
 
 def _mean_readings(source, table, lengths, by_ullage, u, movement):
@@ -498,7 +480,8 @@ def _mean_readings(source, table, lengths, by_ullage, u, movement):
     scatter = np.sqrt((u["u_dip_mm"] / 1000) ** 2 / counts + of_gauge)
     # A longer tape reading raises the level of a dip and lowers that of an ullage.
     sign, length = np.where(is_ullage, 1.0, -1.0), mean(lengths)
-    thermal = _expansion(source.sections["tape"]) * u["u_tape_temperature_k"]
+    expansion = fill_blanks(source.sections["tape"], TAPE)["expansion_per_k"]
+    thermal = expansion * u["u_tape_temperature_k"]
     shared = {
         "tape zero": sign * u["u_tape_zero_mm"] / 1000,
         "tape scale": sign * length * u["u_tape_ppm"] * 1e-6,

@@ -4,18 +4,18 @@ from pathlib import Path
 
 from tankcal.errors import InputError
 from tankcal.messages import message
-from tankcal.products.gauge.commissioning import commission, inputs_of, readings_of, record_of
+from tankcal.products.gauge.commissioning import commission, readings_of
 from tankcal.products.gauge.reading import (
     READINGS,
-    TankFacts,
     read_files,
     read_saved_comparison,
     read_tank,
 )
-from tankcal.products.gauge.saved import GAUGE
+from tankcal.products.gauge.saved import GAUGE, GaugeRecord
 from tankcal.products.recomputing import compare_values, find_record
+from tankcal.products.settings import drop_blanks
 from tankcal.record.manifest import digest_of
-from tankcal.record.schema import to_plain
+from tankcal.record.schema import from_plain, to_plain
 
 
 def compute_again(saved, folder):
@@ -59,7 +59,7 @@ def compute_again(saved, folder):
         )
     else:
         sections, table = read_files(*files)
-        again |= {"inputs": inputs_of(sections), "readings": to_plain(readings_of(table))}
+        again |= {"inputs": drop_blanks(sections), "readings": to_plain(readings_of(table))}
     if facts is not None:
         record = _find_record(saved, folder)
         if record is None:
@@ -72,11 +72,11 @@ def compute_again(saved, folder):
                 )
             )
         else:
-            again["record"] = to_plain(record_of(read_tank(record)))
+            again["record"] = to_plain(read_tank(record))
     comparison = read_saved_comparison(
         saved["inputs"],
         saved["readings"],
-        _facts(facts),
+        None if facts is None else from_plain(GaugeRecord, facts, GAUGE.file),
         tuple((file["file"], file["sha256"]) for file in saved["files"]),
     )
     result = to_plain(commission(comparison))
@@ -90,22 +90,6 @@ def _comparable(gauge):
     keys = ("file", "column", "code", "values")
     warnings = [{key: warning[key] for key in keys} for warning in gauge["warnings"]]
     return {**gauge, "warnings": warnings}
-
-
-def _facts(record):
-    """`TankFacts` of a saved record; None: no record."""
-    if record is None:
-        return None
-    courses = tuple((c["height_m"], c["thickness_m"], c["radius_m"]) for c in record["courses"])
-    return TankFacts(
-        record["tank"],
-        record["sha256"],
-        record["reference_height_m"],
-        record["zero_m"],
-        courses,
-        record["e_pa"],
-        record["notice"],
-    )
 
 
 def _find_inputs(saved, folder):
