@@ -11,7 +11,6 @@ from tankcal.record.schema import Finite, Saved, key
 from tankcal.record.texts import WarningRecord
 
 TICKET = SavedFormat("tankcal-ticket", 1, "ticket.json")
-STATES = ("opening", "closing", "moved")  # "moved": closing less opening
 
 
 class TicketFileEntry(Saved):

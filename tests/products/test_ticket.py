@@ -399,8 +399,7 @@ def test_comparison_of_a_row_may_be_missing(settings, tmp_path):
         (("value = 905.0", ""), True),
     ):
         tickets = read_tickets(_cylinder(), settings(change), rows)
-        transfer = tickets.transfer
-        first, second = rows_of(tickets, transfer.quantities(), transfer.steps)
+        first, second = rows_of(tickets)
         assert (first["difference_nsv_m3"] is None) == is_missing
         assert second["difference_nsv_m3"] is not None
         assert json.dumps([first, second], allow_nan=False)
@@ -508,8 +507,10 @@ def test_output_replaces_only_a_file_of_the_command(settings, example_record, tm
     (tmp_path / "folder.csv").mkdir()
     with pytest.raises(IsADirectoryError):
         check_output(tmp_path / "folder.csv")
-    with pytest.raises(InputError, match=r"\.csv"):
-        check_output(tmp_path / "record.json")
+    other = tmp_path / "record.json"
+    other.write_text("{}", encoding="utf-8")
+    assert main([*arguments[:-1], str(other)]) == 2
+    assert other.read_text(encoding="utf-8") == "{}"
 
 
 def test_failed_output_leaves_the_former_file(settings, example_record, tmp_path, monkeypatch):

@@ -8,8 +8,8 @@ from tankcal import record as records
 from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.products.quantity.chain import QUANTITIES
-from tankcal.products.quantity.reading import read_tickets
-from tankcal.products.quantity.starter import SECTIONS, starter_text, write_starter
+from tankcal.products.quantity.reading import SECTIONS, read_tickets
+from tankcal.products.quantity.starter import FORM, starter_text, write_starter
 from tankcal.products.quantity.table import TankTable
 from tankcal.tank.volume_correction.factors import FactorTable
 from tankcal.tank.volume_correction.petroleum import Petroleum
@@ -162,10 +162,10 @@ def test_own_table_needs_its_uncertainty_and_its_file(tmp_path, monkeypatch):
 def test_the_empty_form_explains_every_key(language):
     text = starter_text(_cylinder(), language, "t.toml")
     notes = load_words(language)["ticket"]["notes"]
-    for section, fields in SECTIONS.items():
+    for section in FORM:
         assert f"\n[{section}]\n" in text
         of_section = notes["gauging" if section in ("opening", "closing") else section]
-        assert of_section.keys() == {field.name for field in fields}
+        assert of_section.keys() == {field.name for field in SECTIONS[section]}
     assert "{" not in text
     assert "ullage" not in starter_text(_cylinder(None), language, "t.toml")
 

@@ -236,7 +236,7 @@ def _zeros(comparison, line):
         }
     U_table = k * MM * float(np.linalg.norm([*columns.values()])) if columns else None
     # The gauge indicates 0 where L + D(L) = 0.
-    level, _, sources = _at_indications(comparison, line, np.zeros(1))
+    level, _, sources = _solve_levels(comparison, line, np.zeros(1))
     U_gauge = MM * float(expand(sources, comparison.probability)[1][0])
     zeros = [
         saved.GaugeZero("dip_plate", 0.0, 0.0, "definition"),
@@ -249,7 +249,7 @@ def _zeros(comparison, line):
     return zeros, columns
 
 
-def _at_indications(comparison, line, indication):
+def _solve_levels(comparison, line, indication):
     """(levels, deviations, sources) at indications; the deviation is a function of the level."""
     level = indication
     for _ in range(3):
@@ -262,7 +262,7 @@ def _corrections(comparison, line, z_table_mm, zero_columns):
     """`GaugeCorrection`s over the levels in use."""
     gauge, dips = comparison.sections["gauge"], comparison.dips
     indication = _indications(gauge["lowest_m"], gauge["highest_m"])
-    level, deviation, sources = _at_indications(comparison, line, indication)
+    level, deviation, sources = _solve_levels(comparison, line, indication)
     _, U, _, k = expand(sources, comparison.probability)
     to_table = [None] * len(level)
     U_table = [None] * len(level)

@@ -76,7 +76,7 @@ def _ticket(options):
     show, written = Progress(options.quiet or options.machine), ()
     if is_folder:
         written = _write_document(tickets, options.out, show)
-    rows = rows_of(tickets, tickets.quantities, tickets.transfer.steps)
+    rows = rows_of(tickets)
     if options.out is not None and not is_folder:
         write_rows(Path(options.out), rows)
     if options.machine:
@@ -203,7 +203,7 @@ def _ticket_lines(tickets):
     from tankcal.text.words import load_words
 
     words = words_with_part(load_words(language_of_run()), "ticket")
-    state = "moved" if "moved" in tickets.quantities else "closing"
+    state = tickets.result_state
     result, place = tickets.quantities[state], QUANTITIES.index("nsv_m3")
     for row, name in enumerate(tickets.names[:SHOWN_TICKETS]):
         written = format_with_u(result.value[row, place], result.U[row, place], marks())

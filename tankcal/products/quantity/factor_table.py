@@ -44,14 +44,9 @@ def read_factor_table(path, base, marks, log, settings_file):
     if densities is None:
         return None
     fields = [
-        number(
-            TEMPERATURE,
-            "temperature of the liquid, degrees Celsius",
-            *LIMITS["temperature_c"],
-            required=True,
-        ),
+        number(TEMPERATURE, "", *LIMITS["temperature_c"], required=True),
         *(
-            number(heading, "volume correction factor", LEAST_FACTOR, MOST_FACTOR, required=True)
+            number(heading, "", LEAST_FACTOR, MOST_FACTOR, required=True)
             for heading in raw.headings[1:]
         ),
     ]

@@ -19,7 +19,7 @@ from tankcal.products.quantity.chain import QUANTITIES, Gauging, Product
 from tankcal.products.quantity.factor_table import read_factor_table
 from tankcal.products.quantity.slips import find_slips
 from tankcal.products.quantity.transfer import STATES, Transfer
-from tankcal.products.settings import read_sections
+from tankcal.products.settings import fill_blanks, read_sections
 from tankcal.record.manifest import digest_of
 from tankcal.tank.gauging import LIMITS, UNCERTAINTIES
 from tankcal.tank.volume_correction.alcohol import Ethanol
@@ -35,25 +35,26 @@ GLASS = {"glass 15C": "15C", "glass 20C": "20C", "glass 60F": "60F"}
 COMPARED = ("gov_m3", "gsv_m3", "nsv_m3", "mass_kg", "weight_kg")
 COEFFICIENT = "coefficient"
 
+# Notes on the keys are in [ticket.notes] of the words of each language.
 TICKET = (
-    Field("number", "text", "number of the ticket"),
-    Field("date", "date", "day of the transfer, year-month-day"),
-    Field("by", "text", "person who gauged the tank"),
-    Field("customer", "text", "customer, or the other party"),
-    Field("note", "text", "remark"),
-    number("coverage_probability", "coverage probability; blank: 0.95", 0.5, 0.9999),
+    Field("number", "text", ""),
+    Field("date", "date", ""),
+    Field("by", "text", ""),
+    Field("customer", "text", ""),
+    Field("note", "text", ""),
+    number("coverage_probability", "", 0.5, 0.9999),
 )
 PRODUCT = (
-    Field("name", "text", "name of the product"),
+    Field("name", "text", ""),
     choice(
         "correction", message("ticket_note_correction", "standard of the volume correction"),
         (*CORRECTIONS,), required=True,
     ),
-    choice("group", "group of the product in D1250", (*GROUPS, COEFFICIENT)),
-    choice("base", "base temperature", (*BASES_C,)),
-    positive("alpha_per_k", "coefficient of cubic expansion of the liquid, 1/K", 0.01),
-    Field("factor_table", "text", "CSV file of factors, for correction = table"),
-    positive("density_kg_m3", "density, kg/m3", LIMITS["density_kg_m3"][1]),
+    choice("group", "", (*GROUPS, COEFFICIENT)),
+    choice("base", "", (*BASES_C,)),
+    positive("alpha_per_k", "", 0.01),
+    Field("factor_table", "text", ""),
+    positive("density_kg_m3", "", LIMITS["density_kg_m3"][1]),
     choice(
         "density_is",
         message(
@@ -62,40 +63,33 @@ PRODUCT = (
         ),
         ("base", "observed"), required=True,
     ),
-    number("density_temperature_c", "temperature of the sample, degrees Celsius",
-           *LIMITS["density_temperature_c"]),
-    choice("hydrometer", "glass hydrometer by its scale; blank: none", (*GLASS,)),
-    number("sw_percent", "suspended sediment and water, percent of the volume; blank: 0",
-           *LIMITS["sw_percent"]),
-    positive("air_kg_m3", "density of the air for the weight in air, kg/m3; blank: 1.2", 2),
-    number("weights_kg_m3", "density of the weights, kg/m3; blank: 8000", 1000, 20_000),
+    number("density_temperature_c", "", *LIMITS["density_temperature_c"]),
+    choice("hydrometer", "", (*GLASS,)),
+    number("sw_percent", "", *LIMITS["sw_percent"]),
+    positive("air_kg_m3", "", 2),
+    number("weights_kg_m3", "", 1000, 20_000),
 )  # fmt: skip
 SHELL = (
-    Field("insulated", "flag", "the shell is insulated; blank: no"),
-    positive("expansion_per_k", "coefficient of linear expansion, 1/K; blank: of the table", 1e-3),
+    Field("insulated", "flag", ""),
+    positive("expansion_per_k", "", 1e-3),
 )
 GAUGING = (
-    number("dip_m", "dip of the liquid, metres", *LIMITS["dip_m"]),
-    number("ullage_m", "ullage, in place of the dip, metres", *LIMITS["ullage_m"]),
-    number("water_dip_m", "dip of the free water, metres; blank: none", *LIMITS["water_dip_m"]),
-    number(
-        "temperature_c", "mean temperature of the liquid, degrees Celsius", *LIMITS["temperature_c"]
-    ),
-    number("ambient_c", "temperature of the air, degrees Celsius", *LIMITS["ambient_c"]),
-    number("pressure_kpa", "gauge pressure above the liquid, kPa; blank: 0", 0, 20_000),
-    number("reference_height_m", "reference height read at the gauging, metres", 0, 200),
+    number("dip_m", "", *LIMITS["dip_m"]),
+    number("ullage_m", "", *LIMITS["ullage_m"]),
+    number("water_dip_m", "", *LIMITS["water_dip_m"]),
+    number("temperature_c", "", *LIMITS["temperature_c"]),
+    number("ambient_c", "", *LIMITS["ambient_c"]),
+    number("pressure_kpa", "", 0, 20_000),
+    number("reference_height_m", "", 0, 200),
 )
 COMPARISON = (
-    choice("quantity", "quantity of the other party", COMPARED),
-    positive("value", "its value, m3 or kg", 1e9),
-    number("U", "its expanded uncertainty, m3 or kg; blank: not known", 0, 1e9),
-    Field("source", "text", "meter or party with this value"),
+    choice("quantity", "", COMPARED),
+    positive("value", "", 1e9),
+    number("U", "", 0, 1e9),
+    Field("source", "text", ""),
 )
 _HIGH = {"u_tape_ppm": 10_000, "u_sw_percent": 10, "u_vcf_percent": 10, "u_expansion_per_k": 1e-4}
-UNCERTAINTY = tuple(
-    number(name, "standard uncertainty; blank: assumed value", 0, _HIGH.get(name, 100))
-    for name in UNCERTAINTIES
-)
+UNCERTAINTY = tuple(number(name, "", 0, _HIGH.get(name, 100)) for name in UNCERTAINTIES)
 SECTIONS = {
     "ticket": TICKET,
     "product": PRODUCT,
@@ -111,12 +105,12 @@ _OF_PRODUCT = ("density_kg_m3", "density_temperature_c", "sw_percent")
 ROWS = (
     Field("ticket", "name", message("ticket_note_ticket", "number of the ticket"), required=True),
     *(
-        Field(f"{state}_{field.name}", field.kind, field.note, low=field.low, high=field.high)
+        Field(f"{state}_{field.name}", field.kind, "", low=field.low, high=field.high)
         for state in STATES
         for field in GAUGING
     ),
     *(field for field in PRODUCT if field.name in _OF_PRODUCT),
-    positive("compared_value", "quantity of the other party, m3 or kg", 1e9),
+    positive("compared_value", "", 1e9),
 )
 
 SETTINGS_NAME = message("ticket_settings", "settings of the ticket")  # in place of a file
@@ -279,9 +273,8 @@ def _read(table, settings, rows, factors):
         factors = read_factor_table(path, product["base"] or "20C", marks, log, name)
         log.stop_if_problems()
     correction = _correction(source, factors)
-    names = ("1",) if columns is None else tuple(columns.of("ticket"))
-    if columns is None:
-        names = (sections["ticket"]["number"] or "1",)
+    single = (sections["ticket"]["number"] or "1",)
+    names = single if columns is None else tuple(columns.of("ticket"))
     # A gauging with a single value is part of the ticket: its missing values are reported below.
     states = [state for state in STATES if source.has_any(state)]
     if "closing" not in states:
@@ -298,10 +291,7 @@ def _read(table, settings, rows, factors):
     _warn_of_slips(source, gaugings, product)
     log.stop_if_problems()
     given = sections["uncertainty"]
-    u = {
-        name: assumed if given[name] is None else given[name]
-        for name, assumed in UNCERTAINTIES.items()
-    }
+    u = fill_blanks(given, UNCERTAINTIES)
     if given["u_sw_percent"] is None:  # without a measurement, no sediment is part of the ticket
         is_measured = np.isfinite(source.numbers("product.sw_percent"))
         u["u_sw_percent"] = np.where(is_measured, u["u_sw_percent"], 0.0)

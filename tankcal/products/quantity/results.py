@@ -36,12 +36,12 @@ class Comparison:
     e_n: np.ndarray | None
 
 
-def compare(tickets, quantities):
+def compare(tickets):
     """`Comparison` with the other party, or None if the tickets contain none."""
     if tickets.compared is None:
         return None
     quantity, values, other_u, source = tickets.compared
-    result, place = quantities.get("moved", quantities["closing"]), QUANTITIES.index(quantity)
+    result, place = tickets.quantities[tickets.result_state], QUANTITIES.index(quantity)
     difference = np.abs(result.value[:, place]) - values
     e_n = None
     if other_u is not None:
@@ -50,21 +50,21 @@ def compare(tickets, quantities):
     return Comparison(quantity, source, difference, e_n)
 
 
-def rows_of(tickets, quantities, steps):
+def rows_of(tickets):
     """{column: value} of each ticket: steps, quantities, u and U, and the comparison.
 
     A number that does not exist, such as a difference without a quantity to compare with, is None.
     """
     columns = {"ticket": list(tickets.names)}
-    for state, result in steps.items():
+    for state, result in tickets.transfer.steps.items():
         for name, values in values_of(result).items():
             columns[f"{state}_{name}"] = values.tolist()
-    for state, result in quantities.items():
+    for state, result in tickets.quantities.items():
         for place, name in enumerate(QUANTITIES):
             columns[f"{state}_{name}"] = result.value[:, place].tolist()
             columns[f"{state}_u_{name}"] = result.u[:, place].tolist()
             columns[f"{state}_U_{name}"] = result.U[:, place].tolist()
-    comparison = compare(tickets, quantities)
+    comparison = compare(tickets)
     if comparison is not None:
         columns[f"difference_{comparison.quantity}"] = _numbers(comparison.difference)
         if comparison.e_n is not None:
@@ -87,13 +87,9 @@ def check_output(path):
     Raises
     ------
     InputError
-        For a name that does not end in .csv, and for an existing file with other contents.
+        For an existing file with other contents.
     IsADirectoryError
     """
-    if path.suffix.lower() != ".csv":
-        raise InputError(
-            Problem("--out", message("ticket_out", "expected the name of a .csv file"))
-        )
     if path.is_dir():
         raise IsADirectoryError(EISDIR, os.strerror(EISDIR), str(path))
     if not path.exists():

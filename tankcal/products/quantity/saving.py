@@ -9,6 +9,7 @@ from tankcal.messages import message
 from tankcal.products.quantity.chain import QUANTITIES
 from tankcal.products.quantity.results import compare
 from tankcal.products.quantity.transfer import STATES
+from tankcal.products.settings import drop_blanks
 from tankcal.record.texts import warnings_of
 from tankcal.record.ticket import (
     ComparisonOfTicket,
@@ -53,7 +54,7 @@ def ticket_file(tickets):
         notice=table.certificate.get("notice") or "",
         tank=table.tank,
         number=tickets.names[0],
-        date=_text(head["date"]),
+        date=head["date"],
         by=head["by"],
         customer=head["customer"],
         product=product["name"],
@@ -74,14 +75,10 @@ def ticket_file(tickets):
         quantities=_quantities(quantities),
         budget=_budget(quantities),
         uncertainties=_uncertainties(sections["uncertainty"], quantities),
-        comparison=_comparison(tickets, quantities),
+        comparison=_comparison(tickets),
         not_in_u=_not_in_u(sections, table),
         factors=_factors(correction),
-        inputs={
-            section: {key: _text(value) for key, value in values.items() if value is not None}
-            for section, values in sections.items()
-            if any(value is not None for value in values.values())
-        },
+        inputs=drop_blanks(sections),
         files=[TicketFileEntry(name, digest) for name, digest in tickets.files.items()],
         warnings=warnings_of(tickets.warnings),
     )
@@ -107,11 +104,6 @@ def document_file(tickets):
     return ticket_file(tickets)
 
 
-def _text(value):
-    """A date as an ISO text; other values unchanged."""
-    return value.isoformat() if hasattr(value, "isoformat") else value
-
-
 def _number(value):
     return float(value) if np.isfinite(value) else None
 
@@ -123,7 +115,7 @@ def _table(table, product):
         table.kind,
         table.certificate.get("number") or None,
         table.certificate.get("laboratory") or None,
-        _text(table.date),
+        table.date,
         table.temperature_c,
         float(product.expansion_per_k[0]),
         table.reference_height_m,
@@ -205,8 +197,8 @@ def _uncertainties(declared, quantities):
     return rows
 
 
-def _comparison(tickets, quantities):
-    comparison = compare(tickets, quantities)
+def _comparison(tickets):
+    comparison = compare(tickets)
     if comparison is None:
         return None
     _, values, other_u, source = tickets.compared

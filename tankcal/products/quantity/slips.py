@@ -10,10 +10,11 @@ import numpy as np
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.products.quantity.results import compare
+from tankcal.products.quantity.transfer import STATES
+from tankcal.products.settings import drop_blanks
 from tankcal.tank.volume_correction.ranges import DEGREES
 
 OTHER_BASES_C = {"15C": 20.0, "20C": 15.0, "60F": 20.0}  # another customary base
-STATES = ("opening", "closing")
 
 
 def find_slips(tickets, read):
@@ -39,7 +40,7 @@ def find_slips(tickets, read):
     slips = []
     for key, text, changed in _candidates(tickets.sections, tickets.transfer.table):
         try:
-            other = _e_n(read(_drop_blanks(changed)))
+            other = _e_n(read(drop_blanks(changed)))
         except InputError:  # the changed ticket is impossible
             continue
         if abs(other) <= 1:
@@ -53,17 +54,10 @@ def find_slips(tickets, read):
 
 def _e_n(tickets):
     """E_n of the comparison of a single ticket; None if it is not known."""
-    comparison = compare(tickets, tickets.quantities)
+    comparison = compare(tickets)
     if comparison is None or comparison.e_n is None or not np.isfinite(comparison.e_n[0]):
         return None
     return float(comparison.e_n[0])
-
-
-def _drop_blanks(sections):
-    return {
-        section: {key: value for key, value in values.items() if value is not None}
-        for section, values in sections.items()
-    }
 
 
 def _candidates(sections, table):

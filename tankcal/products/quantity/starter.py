@@ -4,26 +4,12 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.products.quantity.reading import (
-    COMPARISON,
-    GAUGING,
-    PRODUCT,
-    SHELL,
-    TICKET,
-    UNCERTAINTY,
-)
+from tankcal.products.quantity.reading import SECTIONS
 from tankcal.products.quantity.transfer import STATES
 from tankcal.tank.gauging import ASSUMPTIONS
 from tankcal.text.words import load_words
 
-SECTIONS = {  # in the order of the form
-    "ticket": TICKET,
-    "product": PRODUCT,
-    **dict.fromkeys(STATES, GAUGING),
-    "compared": COMPARISON,
-    "shell": SHELL,
-    "uncertainty": UNCERTAINTY,
-}
+FORM = ("ticket", "product", *STATES, "compared", "shell", "uncertainty")  # order of the sections
 TO_FILL_IN = {  # keys that every ticket needs, besides those that are required
     "ticket": ("number", "date"),
     "product": ("density_kg_m3", "base", "group"),
@@ -53,9 +39,9 @@ def starter_text(table, language, file):
         "reference": f"{table.reference_height_m:g}" if table.reference_height_m else "",
     }
     lines = [f"# {form['title'].format(tank=table.tank)}", f"# {form['then'].format(file=file)}"]
-    for section, fields in SECTIONS.items():
+    for section in FORM:
         lines += ["", f"# {form[f'sections_{section}']}", f"[{section}]"]
-        for field in fields:
+        for field in SECTIONS[section]:
             if field.name == "ullage_m" and not table.reference_height_m:
                 continue
             note = notes["gauging" if section in STATES else section][field.name].format(**values)

@@ -1,6 +1,5 @@
 """Capacity table of a record: volumes at any dip, and their covariance."""
 
-import hashlib
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,6 +11,7 @@ from tankcal import record as records
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.record.covariance_factor import factor_of
+from tankcal.record.manifest import digest_of
 from tankcal.record.schema import Saved, to_plain
 from tankcal.tank.fittings import FloatingRoof, floating_roof
 
@@ -188,7 +188,7 @@ def read_table(path):
             choice["value"] != "off" for choice in record["choices"] if choice["code"] == "roof"
         ),
         reference_height_m=job["datum"]["reference_height_m"],
-        digest=hashlib.sha256(path.read_bytes()).hexdigest(),
+        digest=digest_of(path),
         certificate=job["certificate"],
         date=job["survey"]["date"],
     )
