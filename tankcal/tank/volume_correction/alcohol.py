@@ -150,8 +150,7 @@ class Ethanol:
     def _slope(self, fraction, temperature_c):
         """Derivative of the density by the mass fraction, by central differences."""
         step = 1e-6
-        ends = (mixture_density(fraction + sign * step, temperature_c) for sign in (1, -1))
-        high, low = ends
+        high, low = (mixture_density(fraction + sign * step, temperature_c) for sign in (1, -1))
         return (high - low) / (2 * step)
 
     def _refuse_outside(self, temperature_c, pressure_kpa):

@@ -11,15 +11,10 @@ import numpy as np
 
 from tankcal.messages import message
 from tankcal.tank.volume_correction.petroleum import glass_correction
-from tankcal.tank.volume_correction.ranges import (
-    OutsideRangeError,
-    refuse_not_converged,
-    refuse_outside,
-)
+from tankcal.tank.volume_correction.ranges import OutsideRangeError, iterate_density, refuse_outside
 
 BASE_C = 20.0
 WATER = 0.999042  # g/cm3, of the fit
-MOST_ROUNDS, ROUNDS_OF_CLASSES, CONVERGED = 200, 30, 1e-13  # of the iteration for the density
 LEAST, MOST = 0.498, 1.1  # densities of the fit, g/cm3
 LOWEST_C, HIGHEST_C = 0.0, 60.0  # temperatures of the check values, with a margin
 
@@ -133,17 +128,12 @@ class Brazil:
         observed = density / 1000.0
         step = temperature_c - BASE_C
         glass = glass_correction(temperature_c, "20C")
-        base, bound = observed + 0.0 * observed, None
-        for rounds in range(MOST_ROUNDS):
-            before = base
-            p1, p2, p3, p4 = coefficients_of_class(before if bound is None else bound)
-            base = glass * (observed - p1 * step - p3 * step**2) / (1 + p2 * step + p4 * step**2)
-            if rounds == ROUNDS_OF_CLASSES:
-                bound = np.real(base)
-            is_converged = np.abs(base - before) <= CONVERGED * np.abs(base)
-            if np.all(is_converged):
-                break
-        refuse_not_converged(is_converged, self.name)
+
+        def next_density(base, bound):
+            p1, p2, p3, p4 = coefficients_of_class(base if bound is None else bound)
+            return glass * (observed - p1 * step - p3 * step**2) / (1 + p2 * step + p4 * step**2)
+
+        base = iterate_density(observed, next_density, self.name)
         self._refuse_outside(1000.0 * base, temperature_c, pressure_kpa)
         return 1000.0 * base
 

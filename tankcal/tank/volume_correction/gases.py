@@ -11,13 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.messages import message
-from tankcal.tank.volume_correction.ranges import refuse_not_converged, refuse_outside
+from tankcal.tank.volume_correction.ranges import iterate_density, refuse_outside
 
 WATER_60F = 999.016  # kg/m3, of the relative density 60/60
 BASE_C, BASE_K = (60.0 - 32.0) / 1.8, 519.67 / 1.8
 LEAST_DENSITY, MOST_DENSITY = 0.35, 0.688  # relative density 60/60
 LOWEST_F, HIGHEST_F = -50.8, 199.4
-MOST_ROUNDS, CONVERGED = 200, 1e-13  # of the iteration for the density at 60 degF
 
 # Relative density 60/60, critical temperature K, compressibility at the critical point, critical
 # density mol/L, and k1 to k4 of the saturation density.
@@ -96,17 +95,13 @@ class LiquefiedGas:
 
     def base_density(self, density, temperature_c, pressure_kpa=0.0):
         """Density at 60 degF, kg/m3, of a density at another temperature; as for `factor`."""
-        base = density + 0.0 * density
-        for _ in range(MOST_ROUNDS):
-            before = base
-            relative = np.clip(np.real(before) / WATER_60F, LEAST_DENSITY, MOST_DENSITY)
-            inside = before - np.real(before) + relative * WATER_60F
-            with np.errstate(all="ignore"):  # far outside the range; refused below
-                base = density / self._factor(inside, temperature_c)
-                is_converged = np.abs(base - before) <= CONVERGED * np.abs(base)
-            if np.all(is_converged):
-                break
-        refuse_not_converged(is_converged, self.name)
+
+        def next_density(base, _):
+            relative = np.clip(np.real(base) / WATER_60F, LEAST_DENSITY, MOST_DENSITY)
+            inside = base - np.real(base) + relative * WATER_60F
+            return density / self._factor(inside, temperature_c)
+
+        base = iterate_density(density, next_density, self.name)
         self._refuse_outside(base, temperature_c, pressure_kpa)
         return base
 
@@ -127,8 +122,7 @@ class LiquefiedGas:
         return density_at(temperature_c + 273.15) / density_at(BASE_K)
 
     def _refuse_outside(self, density, temperature_c, pressure_kpa):
-        limits = ((limit - 32) / 1.8 for limit in (LOWEST_F, HIGHEST_F))
-        low, high = limits
+        low, high = ((limit - 32) / 1.8 for limit in (LOWEST_F, HIGHEST_F))
         critical = np.interp(np.real(density) / WATER_60F, _FLUIDS[:, 0], _FLUIDS[:, 1]) - 273.15
         high = np.minimum(high, critical)
         least, most = LEAST_DENSITY * WATER_60F, MOST_DENSITY * WATER_60F

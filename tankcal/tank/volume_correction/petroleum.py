@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.messages import message
-from tankcal.tank.volume_correction.ranges import refuse_not_converged, refuse_outside
+from tankcal.tank.volume_correction.ranges import iterate_density, refuse_outside
 
 EDITIONS, GROUPS = (1980, 2004), ("crude", "products", "lubricants")
 BASES_C = {"15C": 15.0, "20C": 20.0, "60F": (60.0 - 32.0) / 1.8}
@@ -25,10 +25,6 @@ WATER_1980, WATER_2004 = 999.012, 999.016  # kg/m3 at 60 degF, of the API gravit
 KPA_PER_PSI = 6.894757
 # Linear and quadratic coefficient of the reading of a glass hydrometer, per degree of its scale.
 GLASS_EXPANSION = {"15C": (23e-6, 2e-8), "20C": (23e-6, 2e-8), "60F": (12.78e-6, 6.2e-9)}
-
-MOST_ROUNDS = 200  # of the fixed-point iteration for a density at the base
-ROUNDS_OF_GROUPS = 30  # later rounds keep the group of products, so that it cannot alternate
-CONVERGED = 1e-13  # relative change of the density
 
 
 def density_of_gravity(api, water=WATER_1980):
@@ -262,22 +258,8 @@ class Petroleum:
         return ctl / (1 - 1e-5 * compressibility * pressure_kpa / KPA_PER_PSI)
 
     def _iterate(self, density, factor):
-        """Density at the base with rho = density / factor(rho), by fixed-point iteration.
-
-        The factor changes slowly with the density, so each round gains one digit or more.
-        """
-        base, bound = density + 0.0 * density, None
-        for rounds in range(MOST_ROUNDS):
-            before = base
-            with np.errstate(all="ignore"):  # far outside the range; refused below
-                base = density / factor(before, bound)
-                is_converged = np.abs(base - before) <= CONVERGED * np.abs(base)
-            if rounds == ROUNDS_OF_GROUPS:
-                bound = np.real(base)
-            if np.all(is_converged):
-                break
-        refuse_not_converged(is_converged, self.name)
-        return base
+        """Density at the base with rho = density / factor(rho)."""
+        return iterate_density(density, lambda rho, bound: density / factor(rho, bound), self.name)
 
     def _refuse_outside(self, density, temperature_c, pressure_kpa):
         if self.edition == 1980:

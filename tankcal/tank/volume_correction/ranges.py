@@ -1,4 +1,4 @@
-"""Ranges of the inputs of a volume correction."""
+"""Ranges of the inputs of a volume correction, and the iteration for the density at the base."""
 
 import numpy as np
 
@@ -6,6 +6,9 @@ from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 
 DEGREES = message("unit_degc", "degC")
+MOST_ROUNDS = 200  # of the fixed-point iteration for a density at the base
+ROUNDS_OF_GROUPS = 30  # later rounds keep the group or class, so that it cannot alternate
+CONVERGED = 1e-13  # relative change of the density
 
 
 class OutsideRangeError(InputError):
@@ -67,6 +70,44 @@ def refuse_outside(quantity, value, low, high, unit, source):
         )
 
     raise OutsideRangeError(quantity, is_outside, expected_at)
+
+
+def iterate_density(density, next_density, source):
+    """Density at the base by fixed-point iteration from an observed density.
+
+    The density at the base changes the correction slowly, so each round gains one digit or more.
+
+    Parameters
+    ----------
+    density : float or ndarray
+        Start value, real, or complex in a derivative.
+    next_density : callable
+        next_density(base, bound) returns the density at the base by the correction at the density
+        `base`. `bound` is the density that decides the group of products; None: `base`.
+    source : str
+        Volume correction.
+
+    Returns
+    -------
+    float or ndarray
+
+    Raises
+    ------
+    OutsideRangeError
+        If the iteration does not converge.
+    """
+    base, bound = density, None
+    for rounds in range(MOST_ROUNDS):
+        before = base
+        with np.errstate(all="ignore"):  # far outside the range; the caller refuses the result
+            base = next_density(before, bound)
+            is_converged = np.abs(base - before) <= CONVERGED * np.abs(base)
+        if rounds == ROUNDS_OF_GROUPS:
+            bound = np.real(base)
+        if np.all(is_converged):
+            break
+    refuse_not_converged(is_converged, source)
+    return base
 
 
 def refuse_not_converged(is_converged, source):
