@@ -276,10 +276,6 @@ def _check_table(file, record, log):
         text = message("export_bad_heights", "heights that do not rise row by row; expected two "
                        "rows or more that do, with a volume each")  # fmt: skip
         log.problem(file, text, None, "capacity.height_m")
-    columns = ("k", "stated_U_m3")
-    if any(len(getattr(record.capacity, column)) != len(height) for column in columns):
-        text = message("export_columns", "columns of different lengths; expected one value a row")
-        log.problem(file, text, None, "capacity.stated_U_m3")
 
 
 def _find_gauge_correction(file, record, log):

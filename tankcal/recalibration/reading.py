@@ -15,7 +15,6 @@ from tankcal.record.covariance_factor import factor_of
 
 MOST_FINDINGS = 20  # largest number of linter findings listed in an error
 USUAL_K = 2.0
-COLUMNS = ("volume_m3", "stated_U_m3", "k")  # columns of the table in a record
 _RECORD_VALUES = (
     "reference_temperature_c", "liquid_density_kg_m3", "reference_height_m", "date", "method",
     "laboratory", "number", "kind", "dip_from_a_m",
@@ -215,7 +214,6 @@ def _uncertainty(rows, declared, log):
 
 def _table_from_record(path, record, declared, log):
     """Return the FormerTable of a record; declared facts must not contradict it."""
-    factor_m3 = _covariance_factor(record["capacity"], path, log)
     table, job = record["capacity"], record["job"]
     certificate, choices = job.get("certificate") or {}, _choices(record)
     density = choices.get("head", job["table"].get("liquid_density_kg_m3"))
@@ -259,40 +257,10 @@ def _table_from_record(path, record, declared, log):
         k=float(np.median(table["k"])),
         common=declared["common"],
         roof=_roof_of_record(record) or declared.roof,
-        factor_m3=factor_m3,
+        factor_m3=factor_of(table),
         record=record,
         **values,
     )
-
-
-def _covariance_factor(table, path, log):
-    """Return the covariance factor of a record's table.
-
-    Raise InputError for inconsistent lengths.
-    """
-    rows = len(table["height_m"])
-    lengths = {name: len(table[name]) for name in COLUMNS}
-    lengths["factor"] = sum(block["rows"] for block in table["factor"])
-    for name, length in lengths.items():
-        if length != rows:
-            expected = message(
-                "former_unequal_columns",
-                "found {found} values; expected {rows}, one for each height",
-                found=length,
-                rows=rows,
-            )
-            log.problem(path.name, expected, column=f"capacity.{name}")
-    log.stop_if_problems()
-    factor_m3 = None
-    try:
-        factor_m3 = factor_of(table)
-    except ValueError:
-        expected = message(
-            "former_unequal_rows", "found rows of different length; expected as many values in each"
-        )
-        log.problem(path.name, expected, column="capacity.factor")
-    log.stop_if_problems()
-    return factor_m3
 
 
 def _choices(record):

@@ -10,6 +10,7 @@ from tankcal.memory import without_collection
 from tankcal.messages import message
 from tankcal.record import manifest
 from tankcal.record.columns import whole
+from tankcal.record.covariance_factor import factor_of
 from tankcal.record.long_tables import attach_tables, copy_record, omit_tables, split_tables
 from tankcal.record.versions import FORMAT, VERSION, migrated, version_of
 from tankcal.text.delimited import read_json
@@ -21,7 +22,7 @@ __all__ = [
 
 ROWS_AT_ONCE = 1000  # rows of a long list that are converted to JSON at once
 MOST_HEIGHT_M = 1000  # no tank is higher
-NOT_NEGATIVE = ("u_m3", "U_m3", "k", "area_m2")  # columns of the capacity table
+NOT_NEGATIVE = ("u_m3", "U_m3", "stated_U_m3", "k", "area_m2")  # columns of the capacity table
 MOST_VOLUME_M3 = 1e9  # the largest tanks and ships hold less than 1e6 m3
 VOLUME_ROUNDING = 1e-9  # largest decrease by rounding, relative to the largest volume
 _JSON = json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(",", ":"))
@@ -105,7 +106,8 @@ def load(path, *, is_checked=True):
         The file, record.json.
     is_checked : bool, default True
         Refuse a record with another SHA-256 than in SHA256SUMS of its folder, and a record with
-        negative or decreasing volumes.
+        negative or decreasing volumes. A covariance factor that does not fit its table is always
+        refused.
 
     Returns
     -------
@@ -129,6 +131,8 @@ def load(path, *, is_checked=True):
     if is_checked:
         _refuse_altered(Path(path))
         _refuse_impossible(record, name)
+    if record["capacity"] is not None:
+        _refuse_damaged_factor(record["capacity"], name)
     return record
 
 
@@ -232,6 +236,21 @@ def _refuse_impossible(record, name):
             volume=f"{volumes[row]:g}",
         )
         raise InputError(Problem(name, expected))
+
+
+def _refuse_damaged_factor(capacity, name):
+    """Raise InputError for a covariance factor of other rows or inputs than those of its table."""
+    try:
+        factor_of(capacity)
+    except ValueError as error:
+        expected = message(
+            "record_factor",
+            "does not fit the {rows} rows and {inputs} inputs of the table; expected a factor that "
+            "does: run the job again",
+            rows=len(capacity["height_m"]),
+            inputs=len(capacity["inputs"]),
+        )
+        raise InputError(Problem(name, expected, column="capacity.factor")) from error
 
 
 def read(path, *, tables=True):

@@ -22,7 +22,6 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from tankcal.record import content_error
 from tankcal.record.columns import NO_INTEGER, Texts
 from tankcal.record.covariance_factor import factor_of
 from tankcal.record.long_tables import BY_COLUMNS, long_pairs
@@ -235,11 +234,7 @@ def _expand_factor(record):
     if "factor" not in capacity:
         return record
     other = {name: value for name, value in capacity.items() if name != "factor"}
-    try:
-        factor_m3 = factor_of(capacity).tolist()
-    except (LookupError, TypeError, ValueError) as error:  # blocks of other shapes
-        raise content_error("record.json", error) from error
-    return record | {"capacity": other | {"factor_m3": factor_m3}}
+    return record | {"capacity": other | {"factor_m3": factor_of(capacity).tolist()}}
 
 
 def _largest_volume_m3(record):

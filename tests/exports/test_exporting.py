@@ -249,7 +249,7 @@ def test_tables_that_cannot_be_exported(height, volume, code, tmp_path):
 
 
 @pytest.mark.slow(after=6)
-@pytest.mark.parametrize("column", ["u_m3", "U_m3", "k", "area_m2"])
+@pytest.mark.parametrize("column", ["u_m3", "U_m3", "stated_U_m3", "k", "area_m2"])
 @pytest.mark.parametrize("change", [lambda values: values[:-1], lambda values: [-1.0, *values[1:]]])
 def test_columns_that_do_not_fit_their_table(column, change, lying_record, tmp_path):
     record = json.loads(Path(lying_record).read_text())

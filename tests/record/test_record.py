@@ -1,6 +1,7 @@
 """The record: complete, plain, and equal to what was computed."""
 
 import json
+from copy import deepcopy
 
 import numpy as np
 import pytest
@@ -44,6 +45,25 @@ def test_foreign_file_is_refused_as_record(text, tmp_path):
     path.write_text(text)
     with pytest.raises(InputError, match=r"record\.json"):
         load(path)
+
+
+@pytest.mark.parametrize("is_checked", [True, False])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda factor: factor.pop(),
+        lambda factor: factor[-1].update(rows=factor[-1]["rows"] + 1),
+        lambda factor: factor[-1].update(weights=[]),
+        lambda factor: factor[-1]["factor_m3"][0].pop(),
+        lambda factor: [row.append(0.0) for row in factor[-1]["factor_m3"]],
+    ],
+)
+def test_a_damaged_factor_is_refused(record, damage, is_checked, tmp_path):
+    damaged = deepcopy(dict(record["capacity"]))
+    damage(damaged["factor"])
+    save(record | {"capacity": damaged}, tmp_path / "record.json")
+    with pytest.raises(InputError, match=r"record\.json, capacity\.factor: does not fit the "):
+        load(tmp_path / "record.json", is_checked=is_checked)
 
 
 def test_rows_of_the_table_equal_the_result(record, example_result):

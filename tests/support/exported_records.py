@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from tankcal.record import migrated, save
+from tankcal.record.covariance_factor import factor_of
 from tankcal.tank.dips import interpolation_errors
 
 _KEPT = Path(__file__).parents[1] / "records" / "1" / "cluttered.json.gz"
@@ -24,10 +25,12 @@ def record_with(height, volume, own_m3=0.0, **changes):
     record = deepcopy(_kept())
     rows = len(height)
     table = record["capacity"]
+    top = factor_of(table)[-1:].tolist()
     for key, value in table.items():
         if isinstance(value, list) and key not in ("inputs", "input_kind"):
             table[key] = [value[-1]] * rows
     table["height_m"], table["volume_m3"] = (np.asarray(one).tolist() for one in (height, volume))
+    table["factor"] = [{"rows": rows, "weights": [[1.0]] * rows, "factor_m3": top}]
     record["interpolation"] = {"largest_m3": own_m3, "at_m": 0.0}
     record["roof"] = None
     return record | changes
