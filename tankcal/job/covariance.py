@@ -45,8 +45,26 @@ class Archive:
 OF_POINTS = Archive(COVARIANCE_FILE, "points", "points.csv", 3)
 
 
-def read_covariance(data, names, log, archive=OF_POINTS):
-    """Read a covariance matrix and check it.
+def read_covariance(data):
+    """Read the covariance matrix of an archive that `check_covariance` accepts.
+
+    Parameters
+    ----------
+    data : bytes
+        Content of the archive.
+
+    Returns
+    -------
+    ndarray
+        Symmetric matrix, m2.
+    """
+    with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+        matrix = arrays[_MATRIX].astype(float)
+    return (matrix + matrix.T) / 2
+
+
+def check_covariance(data, names, log, archive=OF_POINTS):
+    """Report problems of an archive with a covariance matrix.
 
     Parameters
     ----------
@@ -58,11 +76,6 @@ def read_covariance(data, names, log, archive=OF_POINTS):
         Receives the problems.
     archive : Archive, optional
         Format of the file.
-
-    Returns
-    -------
-    ndarray or None
-        Symmetric matrix, m2; None if it cannot be used.
     """
     if len(names) > MAX_POINTS:
         expected = message(
@@ -74,10 +87,10 @@ def read_covariance(data, names, log, archive=OF_POINTS):
             megabytes=round(8e-6 * (archive.each * len(names)) ** 2),
         )
         log.problem(archive.file, expected)
-        return None
+        return
     arrays = _load(data, len(names), log, archive)
     if arrays is None:
-        return None
+        return
     matrix, its_names = arrays[_MATRIX], arrays[archive.names]
     size = archive.each * len(names)
     complaint = _complaint_about_names(its_names, names, archive)
@@ -85,13 +98,10 @@ def read_covariance(data, names, log, archive=OF_POINTS):
         log.problem(archive.file, complaint, None, archive.names)
     if matrix.shape != (size, size) or matrix.dtype.kind != "f":
         log.problem(archive.file, _other_shape(matrix, size, archive), None, _MATRIX)
-        return None
-    matrix = matrix.astype(float)
-    complaint = _complaint_about_matrix(matrix)
+        return
+    complaint = _complaint_about_matrix(matrix.astype(float))
     if complaint:
         log.problem(archive.file, complaint, None, _MATRIX)
-        return None
-    return (matrix + matrix.T) / 2
 
 
 def _other_shape(matrix, size, archive):

@@ -24,7 +24,7 @@ import tankcal
 from tankcal import record as records
 from tankcal.camera.model import PARAMETERS, Form
 from tankcal.cli import main
-from tankcal.job.covariance import read_covariance
+from tankcal.job.covariance import check_covariance, read_covariance
 from tankcal.memory import return_freed_memory, without_collection
 from tankcal.pipeline.chain import adjust_job
 from tankcal.record.adjusted import _edge_effect, point_results_of
@@ -245,8 +245,10 @@ def test_the_full_covariance_is_read_as_a_job_reads_it(only):
     told = []
     log = SimpleNamespace(problem=lambda *problem: told.append(problem))
     names = [row["point"] for row in record["points"]]
-    covariance = read_covariance((folder / "points_cov.npz").read_bytes(), names, log)
+    data = (folder / "points_cov.npz").read_bytes()
+    check_covariance(data, names, log)
     assert not told
+    covariance = read_covariance(data)
     assert covariance.shape == (3 * len(names),) * 2
     own = np.array([row["cov_m2"] for row in record["points"]])
     blocks = covariance.reshape(len(names), 3, len(names), 3)[np.arange(len(names)), :,

@@ -12,7 +12,7 @@ from tankcal.job.checking import (
     tiny_sd,
 )
 from tankcal.job.checks.extent import has_shape, is_completed
-from tankcal.job.covariance import read_covariance
+from tankcal.job.covariance import check_covariance
 from tankcal.job.entries import kind_of
 from tankcal.job.plausibility import MIN_POINTS_PER_COURSE
 from tankcal.job.tables import COVARIANCE_FILE
@@ -40,7 +40,7 @@ def check_points_of(values, tables, raw, log):
         check_cylinder(points, tables, values, raw, log)
     elif values is not None and has_rows(points):
         check_scan(points, values, kind, raw, log)
-    read_points_covariance(points, raw, log)
+    _check_points_covariance(points, raw, log)
 
 
 def check_points(points, log):
@@ -300,11 +300,11 @@ def _courses_of(table):
     return {name for name, use in pairs if use != "check"}
 
 
-def read_points_covariance(points, raw, log):
-    """Covariance matrix of the points, m2; None if not given or not usable."""
+def _check_points_covariance(points, raw, log):
+    """Check the covariance matrix of the points, if there is one."""
     data = raw.archives.get(COVARIANCE_FILE)
     if data is None:
-        return None
+        return
     if points is None:
         is_unreadable = "points" in raw.tables and raw.tables["points"] is None
         if not is_unreadable:
@@ -313,11 +313,11 @@ def read_points_covariance(points, raw, log):
                 "given without its points; expected points.csv beside it",
             )
             log.problem(COVARIANCE_FILE, expected)
-        return None
+        return
     if points.columns["sx_mm"] is not None:
         expected = message(
             "covariance_beside_sds",
             "given together with sx_mm, sy_mm, sz_mm of the points; expected only one of them",
         )
         log.problem(COVARIANCE_FILE, expected)
-    return read_covariance(data, points.of("point"), log)
+    check_covariance(data, points.of("point"), log)

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from tankcal.job.tables import Log
-from tankcal.methods.points.checks import read_points_covariance
+from tankcal.job.covariance import read_covariance
+from tankcal.job.tables import COVARIANCE_FILE
 from tankcal.survey.points import Points
 
 
 def make_points(tables, raw):
     """Build `Points` from tables and registers without problems."""
-    table = tables["points"]
+    table, covariance = tables["points"], raw.archives.get(COVARIANCE_FILE)
     sd_m = None
     if table.columns["sx_mm"] is not None:
         sd_m = np.column_stack([table.of(f"s{axis}_mm") for axis in "xyz"]).astype(float) / 1000
@@ -17,7 +17,7 @@ def make_points(tables, raw):
         names=tuple(table.of("point")),
         xyz_m=np.column_stack([table.of(f"{axis}_m") for axis in "xyz"]).astype(float),
         sd_m=sd_m,
-        covariance_m2=read_points_covariance(table, raw, Log()),
+        covariance_m2=None if covariance is None else read_covariance(covariance),
         section=tuple(table.of("section")),
         generatrix=tuple(table.of("generatrix")),
         rows=table.rows,

@@ -4,7 +4,7 @@ from tankcal.job.checking import has_rows, is_not_given, missing_beside, refuse_
 from tankcal.job.checks.bearing import of_temperature
 from tankcal.job.checks.extent import is_supplemented, is_surveyed
 from tankcal.job.checks.tapes import refuse_others
-from tankcal.job.covariance import Archive, read_covariance
+from tankcal.job.covariance import Archive, check_covariance
 from tankcal.job.plausibility import DIAMETER_MISS, DIAMETER_MISS_M, IMPOSSIBLE_MISS
 from tankcal.messages import message
 from tankcal.methods.radii.columns import KEYS, NEEDED, NEEDED_OF_CHANGE
@@ -16,7 +16,7 @@ DIAMETER = (1.8, 2.2)  # ratio to the nominal radius that indicates a diameter
 
 def check_radii(values, tables, raw, log):
     """Check courses, radii, their covariance, and required settings; as for `Method.check`."""
-    read_radii_covariance(tables, raw, log)
+    _check_radii_covariance(tables, raw, log)
     if not has_rows(tables["radii"]):
         _tell_without_rows(raw, log)
         return
@@ -151,17 +151,11 @@ def _check_settings(values, tables, raw, log):
         refuse("change", "shared_mm", expected)
 
 
-def read_radii_covariance(tables, raw, log):
-    """Covariance matrix of the radii, in the order of radii.csv, m2; None if not given or invalid.
-
-    Parameters
-    ----------
-    tables, raw, log
-        As for `Method.check`.
-    """
+def _check_radii_covariance(tables, raw, log):
+    """Check the covariance matrix of the radii, if there is one; as for `Method.check`."""
     radii, data = tables["radii"], raw.archives.get(COVARIANCE.file)
     if data is None:
-        return None
+        return
     if radii is None:
         if "radii" not in raw.tables or raw.tables["radii"] is not None:  # else reported already
             expected = message(
@@ -169,14 +163,14 @@ def read_radii_covariance(tables, raw, log):
                 "given without its radii; expected radii.csv beside it",
             )
             log.problem(COVARIANCE.file, expected)
-        return None
+        return
     if radii.columns["u_mm"] is not None:
         expected = message(
             "covariance_beside_u",
             "given together with u_mm of the radii; expected only one of them",
         )
         log.problem(COVARIANCE.file, expected)
-    return read_covariance(data, radii.of("course"), log, COVARIANCE)
+    check_covariance(data, radii.of("course"), log, COVARIANCE)
 
 
 def useless_inputs(values, tables):

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.job.checks.extent import is_surveyed
+from tankcal.job.covariance import read_covariance
 from tankcal.job.structure import structure
-from tankcal.job.tables import Log
-from tankcal.methods.radii.checks import read_radii_covariance
+from tankcal.methods.radii.checks import COVARIANCE
 
 
 @dataclass(frozen=True)
@@ -82,8 +82,10 @@ def make_radii(values, tables, raw):
     # Place the rows of radii.csv in the order of the courses; missing courses stay nan.
     rows = [i for i in order if i is not None]
     radius[is_given] = table.numbers("radius_m")[rows]
-    covariance_m2 = read_radii_covariance(tables, raw, Log())
-    if covariance_m2 is None:
+    data = raw.archives.get(COVARIANCE.file)
+    if data is not None:
+        covariance_m2 = read_covariance(data)
+    else:
         covariance_m2 = np.diag(np.nan_to_num(table.numbers("u_mm") / 1000) ** 2)
     covariance[np.ix_(is_given, is_given)] = covariance_m2[np.ix_(rows, rows)]
     covariance[np.isnan(radius)], covariance[:, np.isnan(radius)] = 0.0, 0.0
