@@ -6,12 +6,7 @@ from tankcal.errors import SHEET
 from tankcal.job.assembly import Attached, make_frame, make_job, read_mesh_file
 from tankcal.job.checking import has_rows
 from tankcal.job.checks import check_all
-from tankcal.job.checks.extent import (
-    has_shape,
-    has_survey,
-    is_sighted,
-    is_strapped,
-)
+from tankcal.job.checks.extent import has_survey, is_sighted, is_strapped
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.entries import ColumnValues, kind_of, read_columns, read_register, read_settings
 from tankcal.job.model.overrulings import Overruling
@@ -143,23 +138,17 @@ def _tell_missing_tables(raw, tables, kind, log):
     if kind == "vertical":
         _tell_sights_missing(raw, tables, log)
         _tell_empty_lists(raw, tables, log)
-    # Any measurement of the shape of the wall replaces the points.
-    for name in REQUIRED_TABLES.get(kind, ()):
-        is_replaced = name == "points" and (
-            has_shape(tables) or any(method.is_given(tables) for method in methods_for(kind))
-        )
-        if name in raw.tables or is_replaced:
-            continue
-        lists = [table for table in _IN_PLACE_OF_POINTS if table in raw.registers]
-        if name == "points" and lists:
-            if raw.registers[lists[0]] is not None:  # else reported already
-                log.problem(raw.registers[lists[0]].file, _IN_PLACE_OF_POINTS[lists[0]])
-            continue
-        replacements = [table for table in _IN_PLACE_OF_POINTS if table in raw.tables]
-        if name != "points" or not replacements:
+    missing = [name for name in REQUIRED_TABLES.get(kind, ()) if name not in raw.tables]
+    is_measured = any(method.is_given(tables) for method in methods_for(kind))
+    if "points" in missing and (is_measured or has_survey(tables)):
+        missing.remove("points")  # any measurement of the wall replaces them
+    sources = raw.registers | raw.tables
+    for name in missing:
+        empty = [other for other in _IN_PLACE_OF_POINTS if name == "points" and other in sources]
+        if not empty:
             log.problem(raw.file_of(name), _missing(raw, name))
-        elif raw.tables[replacements[0]] is not None:  # else reported already
-            log.problem(raw.tables[replacements[0]].file, _IN_PLACE_OF_POINTS[replacements[0]])
+        elif sources[empty[0]] is not None:  # else reported already
+            log.problem(sources[empty[0]].file, _IN_PLACE_OF_POINTS[empty[0]])
 
 
 def _tell_sights_missing(raw, tables, log):
@@ -192,9 +181,9 @@ def _tell_empty_lists(raw, tables, log):
 
 
 _IN_PLACE_OF_POINTS = {  # straps last: other methods have an empty table of them beside their own
-    method.readings_table: method.no_rows()
-    for method in sorted(methods(), key=lambda method: method.comes_last)
-    if method.no_rows()
+    method.readings_table: no_rows
+    for method in sorted(methods(), key=lambda method: (not method.register, method.comes_last))
+    if (no_rows := method.no_rows())
 }
 
 

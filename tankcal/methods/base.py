@@ -86,8 +86,6 @@ class Method:
         all radii has no effect.
     names_levels : bool
         Whether a section is named by its course and the sighted level.
-    has_named_points : bool
-        Whether overrulings.csv can name a sight by its set-up and row, as a point of the wall.
     compares_size : bool
         Whether `warnings` compares the size of the whole tank with the drawing.
     comes_last : bool
@@ -126,7 +124,6 @@ class Method:
     is_smooth = False
     has_own_offset = False
     names_levels = False
-    has_named_points = False
     compares_size = False
     comes_last = False
     field_forms = ()
@@ -134,6 +131,11 @@ class Method:
     csv_files = ()
     hidden_sheets = ()
     saved_note = ""
+
+    @property
+    def has_named_points(self):
+        """Whether points of the wall are single sights, each with the name "set-up row"."""
+        return self.is_sighted and not self.has_means
 
     # ---- job
 
@@ -514,7 +516,7 @@ def accompanying_methods(job):
 
 def is_sighted(job):
     """Whether the points of the wall of a `Job` are single sights of a method."""
-    return any(method.is_sighted and not method.has_means for method in given_methods(job))
+    return any(method.has_named_points for method in given_methods(job))
 
 
 def completing_method(job):

@@ -41,15 +41,14 @@ SECTIONS = (
 _TABLES = (courses, welds, bottom, deadwood, uncertainty, correlations, stated)
 COLUMNS = {table.__name__.rpartition(".")[2]: table.COLUMNS for table in _TABLES}
 COLUMNS |= stadia.COLUMNS
-for _method in methods():
-    COLUMNS |= _method.columns()
-    REGISTER_KEYS |= _method.register_fields()
-COLUMNS |= SURVEY_COLUMNS | overrulings.COLUMNS
 _KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS
 _KEYS |= {"bottom": bottom.KEYS, "top": top.KEYS, "roof": roof.KEYS, "ship": ship.KEYS}
 _KEYS["levels"] = levels.KEYS
 for _method in methods():
+    COLUMNS |= _method.columns()
+    REGISTER_KEYS |= _method.register_fields()
     _KEYS |= _method.settings()
+COLUMNS |= SURVEY_COLUMNS | overrulings.COLUMNS
 KEYS = {section: _KEYS[section] for section in SECTIONS}
 
 SURVEYS = ADJUSTED_SURVEYS | {

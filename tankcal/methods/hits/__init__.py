@@ -19,7 +19,6 @@ class HitsMethod(Method):
     tables_with_sds = ("wall_hits",)
     is_sighted = True
     has_own_offset = True
-    has_named_points = True
     compares_size = True
     field_forms = ((("wall_hits",), 30), (("control_readings",), 24))
     saved_note = "bare wall hits; left out where there are none"

@@ -20,7 +20,6 @@ class InsideHitsMethod(Method):
     needs_station_heights = True
     is_sighted = True
     has_own_offset = True
-    has_named_points = True
     saved_note = (
         "bare wall hits inside a horizontal tank or a sphere; left out where there are none"
     )

@@ -20,7 +20,6 @@ class TangentsMethod(Method):
     is_sighted = True
     names_levels = True
     is_smooth = True
-    has_named_points = True
     compares_size = True
     field_forms = ((("tangents",), 30),)
     saved_note = "tangents from outside; left out where there are none"

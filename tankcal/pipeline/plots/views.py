@@ -54,9 +54,8 @@ def plot(result, what: str | None = None) -> "Figure":
 
 
 def _drawn(draw, result):
-    from tankcal.pipeline.plots import (
-        figures as plots,  # matplotlib is loaded when something is drawn
-    )
+    # matplotlib is loaded when something is drawn
+    from tankcal.pipeline.plots import figures as plots
 
     return draw(plots, result)
 
