@@ -2,8 +2,8 @@
 
 profiles      description of a file for a system (TOML), and the shipped profiles with their texts
 chords, breakpoints   rows selected for a polyline or a spline of few points
-choosing      rows of a record for a profile, or the reasons why the profile does not fit
-writing       the text, and the text read back by the linter
+writing       rows of a record for a profile, or the reasons why it does not fit; the text, and the
+              text read back by the linter
 exporting     from a record to the file, with HyTD of the gauge, provenance and report
 """
 

@@ -108,7 +108,7 @@ def find_break(r, z, sd, shell_radius_m):
 
     The point is searched for within `widest_edge` of the shell. The fit uses the readings within
     three times this distance. Readings on a bulge are rejected, because the flank of a bulge is no
-    break (`bulges.select_beside_bulge`). If the residuals exceed the standard deviations, the
+    break (`select_beside_bulge`). If the residuals exceed the standard deviations, the
     covariance is scaled by the residuals.
 
     Parameters

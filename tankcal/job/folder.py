@@ -319,13 +319,13 @@ def read_register(file, data, log, register=None):
                 continue
             entries[name] = {
                 key: Value(value, rows.get(re.sub(r"[\s\"']", "", f"{place}.{key}")))
-                for key, value in _flat(given)
+                for key, value in flatten_entry(given)
             }
             places[name] = rows.get(place)
     return Register(file, entries, places)
 
 
-def _flat(given):
+def flatten_entry(given):
     """Yield (key, value) of an entry; a key in a nested section becomes section.key."""
     for key, value in given.items():
         if isinstance(value, dict):

@@ -81,7 +81,7 @@ class State:
     usual_density_kg_m3 : float or None
         Prior density; None: the start value of an adjustment.
     bulges_m : ndarray, shape (n, degrees), or None
-        Profiles of the courses (`bulges`); None: straight courses.
+        Profiles of the courses (`upright_shell`); None: straight courses.
     """
 
     base_m3: float

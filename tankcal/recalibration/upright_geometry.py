@@ -2,7 +2,7 @@
 
 Rows below the highest point of the bottom, and rows in the critical zone of a roof, are excluded.
 The other rows are adjusted (`table_fit.fit`). Fittings are sought as pairs of kinks
-(`fittings.find_fittings`), in turn, until no pair explains more than rounding can by chance. The
+(`seams.find_fittings`), in turn, until no pair explains more than rounding can by chance. The
 rows then decide whether the table includes a head, where its zero is, and whether the seams agree
 with the declared ones.
 """
@@ -111,7 +111,7 @@ class UprightGeometry:
         The complete model, as a function of the dip.
     independent_u : (float, ndarray)
         Standard deviations of density and (n,) radii for independent rounding of each row; u is
-        never smaller (`rounding`).
+        never smaller (`table_fit.u_factors`).
     """
 
     name: str

@@ -243,7 +243,7 @@ class ParametersFile(CameraFile, kw_only=True):
 
 
 def plain_parameters(result):
-    """Return the `ParametersFile` of a `parameters.CameraParameters`, as plain data."""
+    """Return the `ParametersFile` of a `judgement.CameraParameters`, as plain data."""
     limit, parts = result.limit, result.components
     known = not math.isnan(limit.um) or not math.isnan(limit.px)
     unscaled = parts.unscaled or parts.of == "covariance"

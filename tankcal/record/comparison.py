@@ -25,7 +25,7 @@ class RoofInTable(Saved):
 
 
 class ComparedTable(Saved):
-    """One of the two tables, as supplied."""
+    """Former or new table, as supplied."""
 
     name: str = key("of the file, and sheet")
     sha256: str = key("of the file")
@@ -170,7 +170,7 @@ class Correlation(Saved):
 
 
 class LegalNumber(Saved):
-    """One of the three numbers that a rule limits."""
+    """A value limited by a rule: at the top, over the range, reference height, or worst row."""
 
     code: str = key('"top", "range", "reference_height"; "row": the worst row')
     limit: float = key("in `unit`")

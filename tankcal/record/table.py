@@ -335,7 +335,7 @@ def budget_of(result):
 
 
 def budget_lines(rows):
-    """Return the `BudgetLine` of each `gum.BudgetRow`."""
+    """Return the `BudgetLine` of each `components.BudgetRow`."""
     return [
         fill_from(
             BudgetLine,

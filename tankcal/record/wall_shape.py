@@ -77,7 +77,7 @@ def shape_record(job, wall):
     ----------
     job : Job
         The computed job.
-    wall : pipeline.surveyed_wall.Wall or None
+    wall : pipeline.wall.surveyed.Wall or None
 
     Returns
     -------

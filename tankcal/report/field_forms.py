@@ -50,7 +50,7 @@ def write_field_sheets(path, survey, language, kind="vertical"):
     survey : str
         "strapping", "reference-line", "wall-hits", "tangents" or "liquid".
     language : str
-        One of `languages.LANGUAGES`.
+        One of `shipped.LANGUAGES`.
     kind : str, optional
         Kind of the tank.
     """

@@ -39,7 +39,7 @@ def write_chart(source, out, language=None, product=None, step_cm=1, *, by_ullag
     out : Path
         Path of the PDF; an existing file is replaced.
     language : str, optional
-        One of `languages.LANGUAGES`; None: the language of the job.
+        One of `shipped.LANGUAGES`; None: the language of the job.
     product : str, optional
         Name of the product; None: that of the job.
     step_cm : int, optional
@@ -120,7 +120,7 @@ def pages(record, rows, language, product=None, digest="", *, by_ullage=False):
     rows : list of (int, float or None)
         Result of `chart_rows`.
     language : str
-        One of `languages.LANGUAGES`.
+        One of `shipped.LANGUAGES`.
     product : str, optional
         Name of the product; None: that of the job.
     digest : str, optional

@@ -454,7 +454,7 @@ class SurfaceBottom(Part):
     surface : Surface
         Surface over the plan (`terrain.Surface`).
     survey : SurveyedSurface or None
-        `soundings.SurveyedSurface`; None for a plate of a given slope.
+        `SurveyedSurface`; None for a plate of a given slope.
     shared : tuple of factors.Factor
         Common errors of the heights of the points: columns (n, c), m.
     has_own_height : bool
@@ -577,7 +577,7 @@ def surveyed_bottom(footprint, xyz_m, sd_m=None, slope=(0.0, 0.0), shared=None):
     Raises
     ------
     SolutionError
-        As for `soundings.surveyed_surface`.
+        As for `surveyed_surface`.
     """
     survey = surveyed_surface(footprint, xyz_m, sd_m, slope)
     return SurfaceBottom(survey.surface, survey, tuple(shared or ()), shared is not None)

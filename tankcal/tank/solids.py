@@ -91,7 +91,7 @@ class LyingTank(LyingSolid):
 
     References
     ----------
-    Jones 2001, Computing fluid tank volumes (untilted); the tilt by quadrature, `arcs`.
+    Jones 2001, Computing fluid tank volumes (untilted); the tilt by quadrature, `lying`.
     """
 
     width_m: float

@@ -19,6 +19,7 @@ from tankcal.errors import sheet_named
 from tankcal.job.contract import KEYS, REGISTER_KEYS, columns_of
 from tankcal.job.contract.registers import FAMILIES, SHORT_KEYS
 from tankcal.job.fields import Field
+from tankcal.job.folder import flatten_entry
 from tankcal.job.sheets import KEY, SECTION, VALUE, is_read
 from tankcal.job.tables import REGISTERS, SETTINGS_SHEET, TABLES
 from tankcal.text.naming import NUMBER
@@ -76,7 +77,7 @@ class EditedKeys:
             entries = content.get(self.name)
             for owner, given in (entries if isinstance(entries, dict) else {}).items():
                 if isinstance(given, dict):
-                    yield owner, dict(_flat(given))
+                    yield owner, dict(flatten_entry(given))
             return
         pending = [(name, given) for name, given in content.items() if isinstance(given, dict)]
         while pending:
@@ -131,15 +132,6 @@ class EditedKeys:
     def render(self):
         """Bytes of the file, and None for row numbers, as problems state owner and key."""
         return self.text.encode("utf-8"), None
-
-
-def _flat(values):
-    """Yield keys and values, with keys of inner tables as table.key."""
-    for key, value in values.items():
-        if isinstance(value, dict):
-            yield from ((f"{key}.{inner}", item) for inner, item in value.items())
-        else:
-            yield key, value
 
 
 def field_of(name, owner, key):

@@ -21,7 +21,7 @@ from tankcal.pipeline.checks.survey import refuse_undetermined
 from tankcal.pipeline.wall.point_covariance import s_transform
 from tankcal.survey import wall_points
 from tankcal.survey.network.assembly import assemble
-from tankcal.survey.network.datum import null_space
+from tankcal.survey.network.datum import motion_derivatives, null_space
 from tankcal.survey.network.results import GlobalTest
 
 MAX_ITERATIONS = 20  # largest number of iterations of the alignment
@@ -350,7 +350,7 @@ def _align(reference, target, xyz, place, rotation):
     motions = motions / np.linalg.norm(motions / scale[:, None], axis=0)
 
     def step_at(block, _):
-        design = _motion_derivatives(block[0]) @ motions
+        design = motion_derivatives(block[0]) @ motions
         misclosure = (target - centre - block[0])[is_known]
         return motions @ np.linalg.lstsq(design[is_known], misclosure, rcond=None)[0]
 
@@ -368,18 +368,6 @@ def _align(reference, target, xyz, place, rotation):
         most_steps=MAX_ITERATIONS,
     )
     return xyz + centre, place + centre, rotation
-
-
-def _motion_derivatives(xyz):
-    """Derivatives (n, 3, 7) of positions by translation, small rotation and scale."""
-    x, y, z = xyz.T
-    derivatives = np.zeros((len(xyz), 3, 7))
-    derivatives[:, :, :3] = np.eye(3)
-    derivatives[:, 0, 4], derivatives[:, 0, 5] = z, -y
-    derivatives[:, 1, 3], derivatives[:, 1, 5] = -z, x
-    derivatives[:, 2, 3], derivatives[:, 2, 4] = y, -x
-    derivatives[:, :, 6] = xyz
-    return derivatives
 
 
 @dataclass(frozen=True)

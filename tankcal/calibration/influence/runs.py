@@ -62,13 +62,13 @@ def select_camera(job, camera=None):
     if camera is None:
         expected = message(
             "camera_several",
-            "several cameras; expected the name of one of them: {names}",
+            "several cameras; expected one of {names}",
             names=[*known],
         )
     else:
         expected = message(
             "camera_without_photos",
-            "no photos of a camera {camera}; expected the name of one of them: {names}",
+            "no photos of a camera {camera}; expected one of {names}",
             camera=camera,
             names=[*known],
         )

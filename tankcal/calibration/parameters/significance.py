@@ -257,7 +257,7 @@ def components(names, covariance, values=None, *, of="correlation", unscaled=Fal
         If the matrix is not symmetric or not finite, or if a variance is not positive.
     """
     if of not in MATRICES:
-        raise ValueError(f"of {of!r}: expected one of {', '.join(MATRICES)}")
+        raise ValueError(f"found of={of!r}; expected one of {', '.join(MATRICES)}")
     matrix = _check_matrix(names, covariance)
     sd = np.sqrt(np.diag(matrix))
     lower = factor_correlations(matrix)

@@ -334,7 +334,7 @@ def _apply_step(values, step_values, misclosures, jacobian, arguments):
 
 
 def linearise_fit(values, rays, image_mm, pixel_mm, form):
-    """Misclosures (2 n,) and derivatives (2 n, 16), px; all rows of x precede those of y.
+    """Return misclosures (2 n,) and derivatives (2 n, 16), px: n rows of x, then n rows of y.
 
     Parameters
     ----------

@@ -199,7 +199,7 @@ class Design:
 
     @property
     def is_smoothed(self):
-        """Whether the readings show the wall smoother than it is: `pipeline.wall.is_smoothed`."""
+        """Whether the readings show the wall smoother than it is: `finding.is_smoothed`."""
         untied = self.ties is None and sum(ring.setups for ring in self.hits) > 1
         return self.tangents is not None or untied
 

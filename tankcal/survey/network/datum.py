@@ -53,7 +53,7 @@ def _derivatives(state):
     n = len(state.photo_xyz_m)
     photos = np.zeros((n, 6, 7))
     if n:
-        photos[:, :3] = _derivatives_of_places(state.photo_xyz_m)
+        photos[:, :3] = motion_derivatives(state.photo_xyz_m)
         # Photo rotations turn with the frame; the sign follows from the small rotation acting on
         # the left.
         photos[:, 3:, 3:6] = -state.rotation
@@ -65,16 +65,15 @@ def _derivatives(state):
         systems[:, 6, 6] = -m
     shared = {name: NUISANCES[name].ways(value) for name, value in state.nuisance.items()}
     return {
-        "points": _derivatives_of_places(state.xyz_m),
+        "points": motion_derivatives(state.xyz_m),
         "photos": photos,
         **shared,
         "system": systems,
     }
 
 
-def _derivatives_of_places(xyz):
-    """Derivatives (n, 3, 7) of positions by the seven motions: identity, cross product,
-    position."""
+def motion_derivatives(xyz):
+    """Derivatives (n, 3, 7) of positions by translation, small rotation and scale."""
     x, y, z = xyz.T
     out = np.zeros((len(xyz), 3, 7))
     out[:, :, :3] = np.eye(3)
@@ -293,7 +292,7 @@ def _staying(combinations, problem):
     """Points and photos that no combination (7, d) moves, in words, and their number."""
     is_used = ~_idle(problem)[id(problem.layout.points)][:, 0]
     xyz = np.vstack([problem.state.xyz_m[is_used], problem.state.photo_xyz_m])
-    size = np.linalg.norm(_derivatives_of_places(xyz) @ combinations, axis=(1, 2))
+    size = np.linalg.norm(motion_derivatives(xyz) @ combinations, axis=(1, 2))
     points = np.flatnonzero(is_used)
     still = np.flatnonzero(size < 1e-3 * size.max())
     names = [problem.name_of_point(int(points[i])) for i in still if i < len(points)]

@@ -1,10 +1,9 @@
 """Dips: rows of a table, labels and units, interpolation between rows, and the inverse reading.
 
-units         volumes in m3, L and bbl; dips in metres or in feet and inches, as numbers and text
-rows          heights of the rows, rounding
-parts         proportional parts: volumes of the millimetres of a dip between two rows
-straightness  error of straight lines between rows, and the step that meets a bound of it
-reading       ullage, and the dip of a volume
+rows          heights of the rows, rounding, ullage, and the dip of a volume; volumes in m3, L and bbl,
+              dips in metres or in feet and inches, as numbers and text
+straightness  error of straight lines between rows, and the step that meets a bound of it;
+              proportional parts: volumes of the millimetres of a dip between two rows
 """
 
 from tankcal.tank.dips.rows import (

@@ -54,11 +54,11 @@ from tankcal.adjust import noncentrality
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 
-UNTOLD = 1e-10  # relative to the largest pivot: a free cause with a smaller pivot is unobserved
-UNSEEN = 1e-12  # relative to c' R^-1 c: a cause with a smaller c' M c cannot be tested
+UNOBSERVED = 1e-10  # relative to the largest pivot: a free cause with a smaller pivot is unobserved
+UNTESTABLE = 1e-12  # relative to c' R^-1 c: a cause with a smaller c' M c cannot be tested
 ALIKE = 3.84  # chi-square at 5 %: a smaller difference between two causes is not significant
 LEAST = 4.0  # least |w| of a named cause
-TOLD = 1e-9  # relative to the largest l: directions with a smaller l are not determined
+UNDETERMINED = 1e-9  # relative to the largest l: directions with a smaller l are not determined
 GRID = 400  # log-spaced variances, from 1e-3 of the mean noise variance to 1e4 of the largest
 
 
@@ -149,7 +149,7 @@ class LiquidAdjustment:
         information = np.einsum("nk,nm,mk->k", columns, self.weight, columns)
         largest = np.sum(columns**2, axis=0) * np.max(np.diag(self.weight), initial=0.0)
         # c' M c relative to its largest possible value: below, the remainder is rounding.
-        is_determined = information > UNSEEN * largest
+        is_determined = information > UNTESTABLE * largest
         divisor = np.where(is_determined, information, 1.0)
         size = np.where(is_determined, columns.T @ self.pulled / divisor, 0.0)
         sd = np.where(is_determined, 1 / np.sqrt(divisor), np.inf)
@@ -166,7 +166,7 @@ class LiquidAdjustment:
         columns = effect.columns
         redundancy = np.einsum("nk,nm,mk->k", columns, self.weight, columns)
         divisor = np.sqrt(np.maximum(redundancy, 1e-30))
-        return deviates, redundancy, np.where(redundancy > UNSEEN, deviates / divisor, 0.0)
+        return deviates, redundancy, np.where(redundancy > UNTESTABLE, deviates / divisor, 0.0)
 
 
 def adjust_steps(misclosure_m3, noise, effects):
@@ -254,7 +254,7 @@ def _whitening_matrix(columns):
 def _refuse_unobserved(upper, free):
     """Raise SolutionError if a free effect is not observed."""
     pivots = np.abs(np.diag(upper))
-    if free and np.min(pivots) < UNTOLD * min(1.0, np.max(pivots)):
+    if free and np.min(pivots) < UNOBSERVED * min(1.0, np.max(pivots)):
         raise SolutionError(
             message(
                 "liquid_unobserved",
@@ -431,7 +431,7 @@ def run_differences(weight, misclosure_m3, run_m3):
     """
     information = run_m3.T @ weight @ run_m3
     size, turn = np.linalg.eigh(information)
-    determined = size > TOLD * size[-1]
+    determined = size > UNDETERMINED * size[-1]
     d = turn.T @ (run_m3.T @ (weight @ misclosure_m3))
     return d[determined] / size[determined], 1 / size[determined]
 
