@@ -160,7 +160,8 @@ class AdjustmentRecord(Saved):
 def adjustment_of(adjustment, measurements=None):
     """Return the `AdjustmentRecord` of an `Adjustment`.
 
-    `measurements` are the `survey.measurements.Measurements` of the adjustment, with settings and image formats.
+    `measurements` are the `survey.measurements.Measurements` of the adjustment, with settings and
+    image formats.
     """
     from tankcal.survey.network.reliability import tau_limit
 

@@ -1,7 +1,7 @@
 """Dips: rows of a table, labels and units, interpolation between rows, and the inverse reading.
 
-rows          heights of the rows, rounding, ullage, and the dip of a volume; volumes in m3, L and bbl,
-              dips in metres or in feet and inches, as numbers and text
+rows          heights of the rows, rounding, ullage, and the dip of a volume; volumes in m3, L and
+              bbl, dips in metres or in feet and inches, as numbers and text
 straightness  error of straight lines between rows, and the step that meets a bound of it;
               proportional parts: volumes of the millimetres of a dip between two rows
 """
