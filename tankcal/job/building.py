@@ -138,10 +138,10 @@ def _tell_missing_tables(raw, tables, kind, log):
     if kind == "vertical":
         _tell_sights_missing(raw, tables, log)
         _tell_empty_lists(raw, tables, log)
-    missing = [name for name in REQUIRED_TABLES.get(kind, ()) if name not in raw.tables]
-    is_measured = any(method.is_given(tables) for method in methods_for(kind))
-    if "points" in missing and (is_measured or has_survey(tables)):
-        missing.remove("points")  # any measurement of the wall replaces them
+    is_measured = has_survey(tables) or any(m.is_given(tables) for m in methods_for(kind))
+    replaced = ["points"] if is_measured else []  # by any measurement of the wall
+    present = {*raw.tables, *replaced}
+    missing = [name for name in REQUIRED_TABLES.get(kind, ()) if name not in present]
     sources = raw.registers | raw.tables
     for name in missing:
         empty = [other for other in _IN_PLACE_OF_POINTS if name == "points" and other in sources]
