@@ -144,12 +144,12 @@ def nothing(task):
 
 def measure_empty(rows, workers):
     """Print what the loop itself costs, and how its memory grows."""
-    from tankcal.batch import running
-    from tankcal.batch.finding import BatchJob
-    from tankcal.batch.journal import open_folder
-    from tankcal.batch.options import Options
-    from tankcal.batch.steps import Task
     from tankcal.pipeline.cluster import open_client
+    from tankcal.products.batch import running
+    from tankcal.products.batch.finding import BatchJob
+    from tankcal.products.batch.journal import open_folder
+    from tankcal.products.batch.options import Options
+    from tankcal.products.batch.steps import Task
 
     options, held = Options(), []
 

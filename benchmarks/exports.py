@@ -18,7 +18,7 @@ import numpy as np
 from exported_records import lying, rows, sphere, tank_s1
 from measured import Row, interleaved, tell
 
-from tankcal.exports.breakpoints import best_breakpoints
+from tankcal.products.exports.breakpoints import best_breakpoints
 
 TANKS = {
     "lying, 2 401 rows": (lying, 2.4, 0.001),

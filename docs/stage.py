@@ -65,11 +65,12 @@ REFERENCE = {  # {title: modules of a page of the reference}, in the order of th
     "Record and papers": ("tankcal.record", "tankcal.report", "tankcal.report.tables"),
     "Calibrations of cameras": ("tankcal.calibration",),
     "Planning": ("tankcal.planning",),
-    "Field books": ("tankcal.fieldbooks",),
+    "Field books": ("tankcal.products.fieldbooks.importing",),
     "Clouds": ("tankcal.clouds", "tankcal.clouds.wall", "tankcal.clouds.inside"),
-    "Linter": ("tankcal.linter",),
+    "Linter": ("tankcal.products.linter.linting", "tankcal.products.linter.totals"),
 }
-TWICE = {"tankcal.survey": "Adjustment", "tankcal.linter": "lint"}  # told with `tankcal`
+# Documented with `tankcal`.
+TWICE = {"tankcal.survey": "Adjustment", "tankcal.products.linter.linting": "lint"}
 
 
 def main(target, executed):

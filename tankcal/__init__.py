@@ -22,10 +22,10 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:  # what a type checker reads; nothing of it runs
     from tankcal.errors import HeightError, InputError, SolutionError, TankcalError
     from tankcal.job import Job, load
-    from tankcal.linter import lint
     from tankcal.pipeline.chain import adjust_job, run
     from tankcal.pipeline.plots.views import plot
     from tankcal.pipeline.result import Result
+    from tankcal.products.linter.linting import lint
     from tankcal.products.quantity.ticketing import ticket
     from tankcal.report.outputs import write
     from tankcal.survey import Adjustment
@@ -41,7 +41,7 @@ _ROOM_OF = {
     "Adjustment": "survey",
     "plot": "pipeline.plots.views",
     "write": "report.outputs",
-    "lint": "linter",
+    "lint": "products.linter.linting",
     "ticket": "products.quantity.ticketing",
     "TankcalError": "errors",
     "InputError": "errors",

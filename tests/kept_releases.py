@@ -12,11 +12,11 @@ import tempfile
 from pathlib import Path
 
 import tankcal
-from tankcal.inspection.inspecting import Asked as ToInspect
-from tankcal.inspection.inspecting import inspect_files
 from tankcal.planning import load_plan, predict
-from tankcal.recalibration.comparison import Asked, compare_files
-from tankcal.recalibration.history_inputs import history_of_files
+from tankcal.products.inspection.inspecting import Asked as ToInspect
+from tankcal.products.inspection.inspecting import inspect_files
+from tankcal.products.recalibration.comparison import Asked, compare_files
+from tankcal.products.recalibration.history_inputs import history_of_files
 from tankcal.record import record_of, record_of_adjustment, save
 from tankcal.record.comparison import COMPARISON
 from tankcal.record.history import HISTORY

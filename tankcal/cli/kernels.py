@@ -19,7 +19,7 @@ ROWS = 3000  # rows of a table whose breakpoints are searched by compiled loops
 def main():
     """Compile the loops that are not saved yet, print the result, and return the exit status."""
     os.environ["TANKCAL_COMPILED"] = "1"
-    from tankcal.exports.breakpoints import best_breakpoints, fewest_breakpoints
+    from tankcal.products.exports.breakpoints import best_breakpoints, fewest_breakpoints
     from tankcal.solver.compiled import available, mark_as_kept
     from tankcal.survey.network import adjust
 

@@ -1,7 +1,7 @@
 """Dask workers on this machine or of a scheduler at an address, and their errors.
 
-`clouds.cluster` reads clouds by workers, and `tankcal.batch` computes jobs. Errors of dask, of the
-network or of another machine are reported in one line.
+`clouds.cluster` reads clouds by workers, and `tankcal.products.batch` computes jobs. Errors of
+dask, of the network or of another machine are reported in one line.
 """
 
 import contextlib

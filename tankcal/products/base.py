@@ -15,18 +15,18 @@ from tankcal.entry_points import find_entry_points
 GROUP = "tankcal.products"  # entry points of products in other distributions
 _BUILT_IN = (  # in the order of `tankcal --help`
     "tankcal.products.shipped:MainJob",
-    "tankcal.products.shipped:Batch",
-    "tankcal.products.shipped:Workbench",
-    "tankcal.products.shipped:FieldBooks",
+    "tankcal.products.batch:Batch",
+    "tankcal.products.workbench:Workbench",
+    "tankcal.products.fieldbooks:FieldBooks",
     "tankcal.products.shipped:Planning",
-    "tankcal.products.shipped:Linter",
-    "tankcal.products.shipped:FormerTables",
-    "tankcal.products.shipped:Exports",
-    "tankcal.products.shipped:Inspection",
+    "tankcal.products.linter:Linter",
+    "tankcal.products.recalibration:FormerTables",
+    "tankcal.products.exports:Exports",
+    "tankcal.products.inspection:Inspection",
     "tankcal.products.quantity:Quantity",
     "tankcal.products.gauge:Gauge",
     "tankcal.products.shipped:Cameras",
-    "tankcal.products.shipped:Intercomparison",
+    "tankcal.products.intercomparison:Intercomparison",
     "tankcal.products.shipped:Help",
 )
 

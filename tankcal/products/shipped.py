@@ -1,4 +1,4 @@
-"""Products whose packages are outside `products/`: their commands, documents and saved formats."""
+"""Products whose packages are outside `products/`: their commands and saved formats."""
 
 from tankcal.products.base import Product
 
@@ -29,35 +29,6 @@ class MainJob(Product):
         return ((versions.RECORD, None, making.Record),)
 
 
-class Batch(Product):
-    """Many jobs."""
-
-    name = "batch"
-    commands = (("batch", "tankcal.cli.batching"),)
-
-    def completions(self):
-        exports, inspection, tables = Exports(), Inspection(), FormerTables()
-        return {
-            ("batch", "--profile"): exports.completions()["export", "--profile"],
-            ("batch", "--inspect-by"): inspection.completions()["inspect", "--rule"],
-            ("batch", "--compare-by"): tables.completions()["compare", "--rule"],
-        }
-
-
-class Workbench(Product):
-    """A job in a notebook or a web page."""
-
-    name = "workbench"
-    commands = (("notebook", "tankcal.cli.workbench"), ("app", "tankcal.cli.workbench"))
-
-
-class FieldBooks(Product):
-    """Files of instruments."""
-
-    name = "fieldbooks"
-    commands = (("import", "tankcal.cli.importing"),)
-
-
 class Planning(Product):
     """Uncertainty of a survey before its measurement."""
 
@@ -68,76 +39,6 @@ class Planning(Product):
         from tankcal.record import plan
 
         return (plan.PLAN, None, plan.PlanFile), (plan.WALL_PLAN, None, plan.WallPlanFile)
-
-
-class Linter(Product):
-    """Errors in capacity tables of any origin."""
-
-    name = "linter"
-    commands = (("lint", "tankcal.cli.linting"),)
-
-
-class FormerTables(Product):
-    """Former tables of a tank: geometry, comparison, history."""
-
-    name = "former tables"
-    commands = (
-        ("read-table", "tankcal.cli.table_reading"),
-        ("compare", "tankcal.cli.comparing"),
-        ("history", "tankcal.cli.history"),
-    )
-
-    def completions(self):
-        from tankcal.job import rule_files
-
-        return {("compare", "--rule"): (rule_files.shipped_names(), True)}
-
-    def documents(self):
-        from tankcal.report import comparison, history
-
-        return comparison.DOCUMENT, history.DOCUMENT
-
-    def saved_types(self):
-        from tankcal.record import comparison, history
-
-        return (
-            (comparison.COMPARISON, None, comparison.ComparisonFile),
-            (history.HISTORY, None, history.HistoryFile),
-        )
-
-
-class Exports(Product):
-    """Capacity tables for gauging systems."""
-
-    name = "exports"
-    commands = (("export", "tankcal.cli.exporting"), ("chart", "tankcal.cli.charting"))
-
-    def completions(self):
-        from tankcal.exports.profiles import shipped_profiles
-
-        return {("export", "--profile"): (tuple(shipped_profiles()), True)}
-
-
-class Inspection(Product):
-    """Condition of a tank from the survey of its calibration."""
-
-    name = "inspection"
-    commands = (("inspect", "tankcal.cli.inspecting"),)
-
-    def completions(self):
-        from tankcal.inspection import rules
-
-        return {("inspect", "--rule"): (rules.shipped_names(), True)}
-
-    def documents(self):
-        from tankcal.report import inspection
-
-        return (inspection.DOCUMENT,)
-
-    def saved_types(self):
-        from tankcal.record import inspection
-
-        return ((inspection.INSPECTION, None, inspection.InspectionFile),)
 
 
 class Cameras(Product):
@@ -168,23 +69,6 @@ class Cameras(Product):
             (CAMERA, "parameters", camera_parameters.ParametersFile),
             (CAMERA, "influence", camera_influence.InfluenceFile),
             (CAMERA, "product", camera_product.ProductFile),
-        )
-
-
-class Intercomparison(Product):
-    """Comparison of programs by simulated tanks."""
-
-    name = "intercomparison"
-    commands = (("intercomparison", "tankcal.cli.intercomparison"),)
-
-    def saved_types(self):
-        from tankcal.record import intercomparison as saved
-
-        return (
-            (saved.PACKAGE, None, saved.PackageFile),
-            (saved.TRUTH, None, saved.TruthFile),
-            (saved.ANSWERS, None, saved.AnswersFile),
-            (saved.SCORES, None, saved.ScoresFile),
         )
 
 

@@ -46,11 +46,11 @@ def read_plan_language(path):
 
 def read_record_language(path):
     """Return the language of the job of a record, or of the record in a folder of results."""
-    from tankcal.inspection.basis import RECORD
+    from tankcal.record.versions import RECORD
 
     path = Path(path)
     try:
-        record = read_json(path / RECORD if path.is_dir() else path)
+        record = read_json(path / RECORD.file if path.is_dir() else path)
         return nearest_language(record["job"]["table"]["language"])
     except (OSError, ValueError, LookupError, TypeError, RecursionError):
         return None

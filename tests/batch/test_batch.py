@@ -15,10 +15,10 @@ import pytest
 from batch_jobs import bytes_of, jobs_in, journal_of, spoil, write_jobs
 from conftest import EXAMPLE
 
-from tankcal.batch import journal, running, steps
-from tankcal.batch.options import Options
-from tankcal.batch.summary import find_changes
 from tankcal.cli import main
+from tankcal.products.batch import journal, running, steps
+from tankcal.products.batch.options import Options
+from tankcal.products.batch.summary import find_changes
 
 pytestmark = pytest.mark.slow  # seconds of runs and papers
 
@@ -229,7 +229,7 @@ def test_a_full_disk_stops_in_one_line(tmp_path, monkeypatch, capsys):
 
 
 def test_input_that_cannot_be_read(two, monkeypatch, capsys):
-    from tankcal.batch import fingerprints
+    from tankcal.products.batch import fingerprints
 
     digest = fingerprints._digest
 
@@ -300,7 +300,7 @@ def test_two_batches_into_one_folder(two, capsys):
 @pytest.mark.slow
 def test_a_lock_is_stale_after_kill_9(two):
     code = (
-        "import sys, time; from tankcal.batch.journal import open_folder\n"
+        "import sys, time; from tankcal.products.batch.journal import open_folder\n"
         "with open_folder(sys.argv[1]): print('locked', flush=True); time.sleep(60)"
     )
     with subprocess.Popen(

@@ -26,10 +26,10 @@ from batch_jobs import (
     write_jobs,
 )
 
-from tankcal.batch import running
-from tankcal.batch.options import Options
-from tankcal.batch.running import Callbacks, run_batch
 from tankcal.errors import InputError
+from tankcal.products.batch import running
+from tankcal.products.batch.options import Options
+from tankcal.products.batch.running import Callbacks, run_batch
 
 pytest.importorskip("distributed")
 pytestmark = pytest.mark.slow
@@ -38,7 +38,7 @@ LIGHT = Options(papers=False)
 JOBS = 6
 BATCH = """
 import sys
-from tankcal.batch import running
+from tankcal.products.batch import running
 from tankcal.cli import main
 from batch_jobs import do_slowly
 running.do_job = do_slowly

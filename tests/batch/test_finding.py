@@ -4,9 +4,9 @@ import pytest
 from batch_jobs import write_jobs
 from job_builder import write_workbook
 
-from tankcal.batch.finding import find_jobs
-from tankcal.batch.options import Options, parse_steps, refuse_incomplete
 from tankcal.errors import InputError
+from tankcal.products.batch.finding import find_jobs
+from tankcal.products.batch.options import Options, parse_steps, refuse_incomplete
 
 RUN = Options()
 

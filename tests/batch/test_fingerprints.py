@@ -7,9 +7,9 @@ from batch_jobs import write_jobs
 from job_builder import write_workbook
 
 import tankcal
-from tankcal.batch.finding import BatchJob
-from tankcal.batch.fingerprints import compute_keys, digest_inputs
-from tankcal.batch.options import Options
+from tankcal.products.batch.finding import BatchJob
+from tankcal.products.batch.fingerprints import compute_keys, digest_inputs
+from tankcal.products.batch.options import Options
 
 ALL = Options(steps=("run", "compare", "inspect"))
 

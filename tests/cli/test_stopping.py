@@ -26,7 +26,7 @@ needs_signals = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX"
 @needs_signals
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
 def test_a_signal_is_told_as_ctrl_c_is(monkeypatch, capsys, name):
-    from tankcal.cli import linting
+    from tankcal.products.linter import command as linting
 
     number = getattr(signal, name)
     usual = signal.signal(number, signal.SIG_DFL)  # the tests may run under nohup

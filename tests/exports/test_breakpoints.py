@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from exported_records import TOP_S1, ellipsoidal, lying, rows, sphere, tank_s1
 
-from tankcal.exports.breakpoints import best_breakpoints, fewest_breakpoints
+from tankcal.products.exports.breakpoints import best_breakpoints, fewest_breakpoints
 
 PUBLISHED = [  # exports.md, section 3: tank, top, step, points, optimum or greedy in L, is optimum
     (lying, 2.4, 0.001, {11: 104.055, 20: 26.039, 21: 26.039, 25: 18.176, 40: 6.589, 100: 1.081}),
@@ -123,7 +123,7 @@ def test_fewer_points_than_fixed_rows_are_refused():
 @pytest.mark.slow
 def test_compiled_and_plain_loops_agree(monkeypatch):
     """Second method: the same loops, compiled."""
-    from tankcal.exports import breakpoints
+    from tankcal.products.exports import breakpoints
 
     h, v = rows(lying, 2.4, 0.001)
     found = best_breakpoints(h, v, 20)

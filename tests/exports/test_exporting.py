@@ -13,8 +13,8 @@ from linted_tables import DECIMALS, SHAPES, STEPS
 
 from tankcal.cli import main
 from tankcal.errors import InputError
-from tankcal.exports.exporting import export_record, write_export
-from tankcal.exports.profiles import find_profile, shipped_profiles
+from tankcal.products.exports.exporting import export_record, write_export
+from tankcal.products.exports.profiles import find_profile, shipped_profiles
 from tankcal.record import save
 from tankcal.tank.dips import table_heights
 
@@ -326,7 +326,7 @@ def test_both_files_or_none(lying_record, tmp_path):
 @pytest.mark.slow
 def test_hytd_of_an_upright_tank(tmp_path):
     """Second method: the line of the gauge is that of the record's own plates and radii."""
-    from tankcal.exports.exporting import gauge_correction
+    from tankcal.products.exports.exporting import gauge_correction
 
     record = record_with(*rows(tank_s1, 8.4, 0.2))
     record["choices"] = [one for one in record["choices"] if one["code"] != "head"]

@@ -5,9 +5,9 @@ from fractions import Fraction
 import pytest
 
 from tankcal.errors import InputError
-from tankcal.exports.profiles import find_profile, parse_profile, shipped_profiles
-from tankcal.exports.writing import count_increments, to_quanta
 from tankcal.job.tables import Log
+from tankcal.products.exports.profiles import find_profile, parse_profile, shipped_profiles
+from tankcal.products.exports.writing import count_increments, to_quanta
 from tankcal.tank.dips import parse_dip
 
 GOOD = """

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tankcal.exports.exporting import gauge_correction, shortening_m
+from tankcal.products.exports.exporting import gauge_correction, shortening_m
 
 S1 = tuple(
     zip(

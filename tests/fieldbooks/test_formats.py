@@ -7,7 +7,7 @@ import pytest
 
 from tankcal.cli import main
 from tankcal.errors import InputError
-from tankcal.fieldbooks import Choices, import_fieldbooks
+from tankcal.products.fieldbooks.importing import Choices, import_fieldbooks
 
 TIES = {"targets_mm": 1.0, "targets_arcsec": 3.0}
 

@@ -10,7 +10,7 @@ from written_fieldbooks import PROFILE, WRITERS
 
 from tankcal.cli import main
 from tankcal.errors import InputError
-from tankcal.fieldbooks import Choices, import_fieldbooks
+from tankcal.products.fieldbooks.importing import Choices, import_fieldbooks
 
 FEW, MANY = 25, draws(150, 3000)
 WHOLE = (

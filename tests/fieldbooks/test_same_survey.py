@@ -13,7 +13,7 @@ from written_fieldbooks import PROFILE, WRITERS, gsi, jobxml, rw5, sdr
 
 import tankcal
 from tankcal.cli import main
-from tankcal.fieldbooks import Choices, import_fieldbooks
+from tankcal.products.fieldbooks.importing import Choices, import_fieldbooks
 
 TIES = {"targets_mm": 1.0, "targets_arcsec": 3.0}
 ARCSEC = 1 / 3600

@@ -10,7 +10,7 @@ from simulated_fieldbooks import one_stand
 from written_fieldbooks import PROFILE, WRITERS
 
 from tankcal.errors import InputError
-from tankcal.fieldbooks import Choices, import_fieldbooks
+from tankcal.products.fieldbooks.importing import Choices, import_fieldbooks
 
 TRANSFERS = {
     "STX in the first line": lambda data: b"\x02\r\n" + data,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from conftest import EXAMPLE
 
-from tankcal.linter import lint
+from tankcal.products.linter.linting import lint
 from tankcal.record import record_of
 from tankcal.report import certificate
 from tankcal.report.outputs.tables import write_tables

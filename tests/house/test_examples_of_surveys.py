@@ -14,7 +14,7 @@ from conftest import EXAMPLE
 
 import tankcal
 from tankcal.camera.model import PARAMETERS
-from tankcal.linter import lint
+from tankcal.products.linter.linting import lint
 from tankcal.record import record_of
 from tankcal.report.outputs.tables import write_tables
 from tankcal.report.workbook import write as write_workbook

@@ -18,9 +18,9 @@ from survey_builder import survey_parts
 
 from tankcal.errors import InputError, SolutionError
 from tankcal.job import load
-from tankcal.linter import lint
 from tankcal.pipeline.chain import run
 from tankcal.planning.reading import load_plan
+from tankcal.products.linter.linting import lint
 
 pytestmark = pytest.mark.slow
 

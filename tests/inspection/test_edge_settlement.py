@@ -5,10 +5,10 @@ import pytest
 from jacobians import assert_derivative
 from numpy.testing import assert_allclose
 
-from tankcal.inspection.edges import assess_edges, bent_line, find_break, find_bulge
-from tankcal.inspection.levelling import RadialLine
-from tankcal.inspection.rules import BulgeLimits, EdgeLimits, largest_drop_mm
 from tankcal.job.tables import Log
+from tankcal.products.inspection.edges import assess_edges, bent_line, find_break, find_bulge
+from tankcal.products.inspection.levelling import RadialLine
+from tankcal.products.inspection.rules import BulgeLimits, EdgeLimits, largest_drop_mm
 
 pytestmark = pytest.mark.slow  # seconds of fits
 

@@ -6,16 +6,16 @@ from levelled_tanks import LIMITS, epoch_of, even_azimuths
 from numpy.testing import assert_allclose
 from settled_tanks import CLASSES, FAMILIES, levelled_class, shares
 
-from tankcal.inspection.out_of_plane import (
+from tankcal.products.inspection.out_of_plane import (
     Statistic,
     estimate_statistic,
     find_neighbours,
     fit_plane,
     simulate_errors,
 )
-from tankcal.inspection.rules import Strength
-from tankcal.inspection.settlement import assess, settlement_figures
-from tankcal.inspection.verdict import severity, verdict_of
+from tankcal.products.inspection.rules import Strength
+from tankcal.products.inspection.settlement import assess, settlement_figures
+from tankcal.products.inspection.verdict import severity, verdict_of
 
 N = 16
 T = even_azimuths(N)

@@ -9,9 +9,9 @@ from job_builder import write_job
 
 from tankcal.cli import main
 from tankcal.errors import InputError
-from tankcal.inspection.inspecting import Asked, inspect_files
-from tankcal.inspection.rules import find_rule, parse_rule
 from tankcal.job.tables import Log
+from tankcal.products.inspection.inspecting import Asked, inspect_files
+from tankcal.products.inspection.rules import find_rule, parse_rule
 from tankcal.record import record_of, save
 from tankcal.record.inspection import CHECKS
 from tankcal.record.schema import to_plain

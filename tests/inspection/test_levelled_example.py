@@ -8,10 +8,13 @@ import tomllib
 import numpy as np
 import pytest
 
-from tankcal.inspection.edges import assess_edges
-from tankcal.inspection.inspecting import Bottom, inspect_bottom
-from tankcal.inspection.levelling import read_edge_profiles, read_settlement
-from tankcal.inspection.rules import (
+from tankcal.job.entries import read_section
+from tankcal.job.folder import read_toml
+from tankcal.job.tables import Log
+from tankcal.products.inspection.edges import assess_edges
+from tankcal.products.inspection.inspecting import Bottom, inspect_bottom
+from tankcal.products.inspection.levelling import read_edge_profiles, read_settlement
+from tankcal.products.inspection.rules import (
     BULGE,
     EDGE,
     SETTLEMENT,
@@ -20,14 +23,11 @@ from tankcal.inspection.rules import (
     edge_limits,
     settlement_limits,
 )
-from tankcal.inspection.settlement import assess_settlement
-from tankcal.job.entries import read_section
-from tankcal.job.folder import read_toml
-from tankcal.job.tables import Log
+from tankcal.products.inspection.settlement import assess_settlement
 from tankcal.text.shipped import shipped_folder
 
 FOLDER = shipped_folder("examples") / "inspection"
-RULE = shipped_folder("inspection/rules") / "api_653.toml"
+RULE = shipped_folder("products/inspection/rules") / "api_653.toml"
 TANK = Strength(diameter_m=13.0, height_m=9.5, yield_pa=250e6, e_pa=206e9)
 
 

@@ -7,11 +7,11 @@ from levelled_tanks import A_MM, LIMITS, TANK_A, settlement_rows
 from messages_told import lines
 from numpy.testing import assert_allclose
 
-from tankcal.inspection.edges import assess_edges
-from tankcal.inspection.levelling import read_edge_profiles, read_settlement
-from tankcal.inspection.rules import BulgeLimits, EdgeLimits
-from tankcal.inspection.settlement import assess_settlement
 from tankcal.job.tables import Log
+from tankcal.products.inspection.edges import assess_edges
+from tankcal.products.inspection.levelling import read_edge_profiles, read_settlement
+from tankcal.products.inspection.rules import BulgeLimits, EdgeLimits
+from tankcal.products.inspection.settlement import assess_settlement
 
 POINTS = {f"P{i + 1}": (22.5 * i, 12 + z / 1000) for i, z in enumerate(A_MM)}
 GOOD = settlement_rows({"2019": POINTS, "2024": POINTS})

@@ -6,23 +6,23 @@ from jacobians import assert_derivative
 from levelled_tanks import A_MM, LIMITS, TANK_A, epoch_of, even_azimuths, waves
 from numpy.testing import assert_allclose
 
-from tankcal.inspection.levelling import Levelling, is_within_noise
-from tankcal.inspection.out_of_plane import (
+from tankcal.job.tables import Log
+from tankcal.products.inspection.levelling import Levelling, is_within_noise
+from tankcal.products.inspection.out_of_plane import (
     find_largest_curvature,
     find_neighbours,
     fit_plane,
     r_squared,
     select_subset,
 )
-from tankcal.inspection.rules import SettlementLimits, Strength, compute_curvature_limit
-from tankcal.inspection.settlement import (
+from tankcal.products.inspection.rules import SettlementLimits, Strength, compute_curvature_limit
+from tankcal.products.inspection.settlement import (
     assess,
     assess_settlement,
     make_settlement,
     settlement_figures,
 )
-from tankcal.inspection.verdict import make_check
-from tankcal.job.tables import Log
+from tankcal.products.inspection.verdict import make_check
 
 
 def figures(epoch, strength, limits=LIMITS, dof=np.inf):

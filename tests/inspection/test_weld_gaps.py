@@ -24,8 +24,8 @@ from scanned_tanks import scanned_parts
 
 import tankcal
 from tankcal.clouds.wall import Passes, find_cloud_wall
-from tankcal.inspection.weld_gaps import empty_gaps, find_gaps, find_gaps_in_cloud
-from tankcal.inspection.welds import (
+from tankcal.products.inspection.weld_gaps import empty_gaps, find_gaps, find_gaps_in_cloud
+from tankcal.products.inspection.welds import (
     build_round_grid,
     build_upright_grid,
     fill_weld_cells,

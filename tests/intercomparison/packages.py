@@ -3,8 +3,8 @@
 import json
 from functools import cache
 
-from tankcal.intercomparison.answers import answer_files, make_forms
-from tankcal.intercomparison.package import make_package, write_files
+from tankcal.products.intercomparison.answers import answer_files, make_forms
+from tankcal.products.intercomparison.package import make_package, write_files
 from tankcal.record.intercomparison import Answer, AnswersFile, Participant
 
 METHODS = ("points", "total-station")

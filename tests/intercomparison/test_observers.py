@@ -8,11 +8,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tankcal.camera.model import PARAMETERS, Form, distort_image_points
-from tankcal.intercomparison.observers import METHODS, tape
-from tankcal.intercomparison.observers.cloud import observe_cloud
-from tankcal.intercomparison.observers.photographs import camera_rotation, photograph
-from tankcal.intercomparison.site import Chance, observe_site, request_table
-from tankcal.intercomparison.tank import draw_tank
+from tankcal.products.intercomparison.observers import METHODS, tape
+from tankcal.products.intercomparison.observers.cloud import observe_cloud
+from tankcal.products.intercomparison.observers.photographs import camera_rotation, photograph
+from tankcal.products.intercomparison.site import Chance, observe_site, request_table
+from tankcal.products.intercomparison.tank import draw_tank
 
 U_READ_M = 2e-5  # files have hundredths of a millimetre
 
@@ -221,7 +221,7 @@ def test_what_is_declared_holds_the_errors():
 def test_tankcal_finds_the_tank(method, tmp_path, figure):
     """A perfect crew: what is left is the wall that no reading shows, well within U."""
     import tankcal
-    from tankcal.intercomparison.package import job_files, write_files
+    from tankcal.products.intercomparison.package import job_files, write_files
 
     tank = draw_tank(np.random.default_rng(1), "T1", "coil")
     asked = request_table(tank, 850.0)

@@ -8,7 +8,7 @@ from packages import answers_of, write_answers, written_package
 
 from tankcal.cli import main
 from tankcal.errors import SolutionError
-from tankcal.intercomparison.answers import answer_package
+from tankcal.products.intercomparison.answers import answer_package
 from tankcal.tank.capacity import Quantity
 from tankcal.text.shipped import LANGUAGES
 

@@ -15,14 +15,14 @@ from packages import (
     written_package,
 )
 
-from tankcal.cli.intercomparison import METHODS as NAMED
 from tankcal.errors import InputError
-from tankcal.intercomparison.observers import METHODS as ALL
-from tankcal.intercomparison.package import load_package, make_package
-from tankcal.intercomparison.scoring import score_folders
-from tankcal.intercomparison.tank import tank_of
 from tankcal.job import load
 from tankcal.job.tables import Log
+from tankcal.products.intercomparison.command import METHODS as NAMED
+from tankcal.products.intercomparison.observers import METHODS as ALL
+from tankcal.products.intercomparison.package import load_package, make_package
+from tankcal.products.intercomparison.scoring import score_folders
+from tankcal.products.intercomparison.tank import tank_of
 
 
 def test_commitment_is_the_hash_of_the_file(tmp_path):
@@ -70,7 +70,7 @@ def test_every_column_is_explained():
 
 @pytest.mark.slow
 def test_all_methods_load_as_jobs(tmp_path):
-    from tankcal.intercomparison.package import write_files
+    from tankcal.products.intercomparison.package import write_files
 
     made = make_package(1, 4, tuple(ALL), secret=SECRET, nonce=NONCE)
     write_files(tmp_path, made.files)

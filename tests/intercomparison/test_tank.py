@@ -7,9 +7,17 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from tankcal.intercomparison.defects import Band, Buckle, Course, Dent, Flat, Oval, Seam
-from tankcal.intercomparison.site import request_table
-from tankcal.intercomparison.tank import FAMILIES, Fitting, Floor, Tank, Wave, draw_tank, tank_of
+from tankcal.products.intercomparison.defects import Band, Buckle, Course, Dent, Flat, Oval, Seam
+from tankcal.products.intercomparison.site import request_table
+from tankcal.products.intercomparison.tank import (
+    FAMILIES,
+    Fitting,
+    Floor,
+    Tank,
+    Wave,
+    draw_tank,
+    tank_of,
+)
 from tankcal.units import STANDARD_GRAVITY
 
 LEVEL = Floor()

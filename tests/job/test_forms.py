@@ -6,13 +6,13 @@ from filled_forms import fill_form, place_of
 from job_builder import SETTINGS, job_parts
 
 import tankcal
-from tankcal.batch.finding import find_jobs
-from tankcal.batch.options import Options
 from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.job.contract import COLUMNS
 from tankcal.job.starter import write_form, write_input_workbook, write_starter
 from tankcal.job.starter.form import Form
+from tankcal.products.batch.finding import find_jobs
+from tankcal.products.batch.options import Options
 from tankcal.report.folders import default_folder
 from tankcal.terminal.input_language import read_job_language
 from tankcal.text.shipped import DEFAULT, LANGUAGES

@@ -10,11 +10,12 @@ from written_fieldbooks import WRITERS
 
 from tankcal import load
 from tankcal.errors import InputError
-from tankcal.fieldbooks.detection import read_book
 from tankcal.job import folder
 from tankcal.job.tables import MAX_COLUMNS, MAX_LINES, Log
-from tankcal.linter import grids, lint
-from tankcal.linter.pdf_text import MOST_CONTENT
+from tankcal.products.fieldbooks.detection import read_book
+from tankcal.products.linter import grids
+from tankcal.products.linter.linting import lint
+from tankcal.products.linter.pdf_text import MOST_CONTENT
 
 
 @pytest.fixture

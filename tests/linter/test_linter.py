@@ -15,18 +15,19 @@ from hypothesis import strategies as st
 from linted_tables import DECIMALS, SHAPES, STEPS, WIDE, courses, lying, rows_of
 
 from tankcal.errors import InputError, TankcalError
-from tankcal.linter import Nominal, lint
-from tankcal.linter.examination import (
+from tankcal.products.linter.examination import (
     ScreenedRows,
     _is_below_zero,
     examine,
     leave_one_out,
     most_suspicious,
 )
-from tankcal.linter.headings import heading_of
-from tankcal.linter.numbers import Style, read_number, style_of
-from tankcal.linter.volumes import suggest_number
-from tankcal.recalibration.reading import read_former
+from tankcal.products.linter.headings import heading_of
+from tankcal.products.linter.linting import lint
+from tankcal.products.linter.numbers import Style, read_number, style_of
+from tankcal.products.linter.totals import Nominal
+from tankcal.products.linter.volumes import suggest_number
+from tankcal.products.recalibration.reading import read_former
 from tankcal.tank.dips import dip_label, table_heights
 
 

@@ -16,9 +16,9 @@ from tables_of_others import (
 
 from tankcal.errors import InputError
 from tankcal.job.tables import Log
-from tankcal.linter import lint
-from tankcal.linter.headings import heading_of
-from tankcal.linter.rows import read_rows
+from tankcal.products.linter.headings import heading_of
+from tankcal.products.linter.linting import lint
+from tankcal.products.linter.rows import read_rows
 from tankcal.text.words import load_words, say
 
 CM = [k / 100 for k in range(101)]

@@ -13,7 +13,7 @@ from scipy import stats
 
 from tankcal.cli import main
 from tankcal.errors import InputError
-from tankcal.exports.exporting import POISSON, shortening_m
+from tankcal.products.exports.exporting import POISSON, shortening_m
 from tankcal.products.gauge.commissioning import commission
 from tankcal.products.gauge.deviation import (
     SCATTER_DOF,

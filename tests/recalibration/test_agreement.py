@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tables_of_s1 import RADII, new_s1, rings_m3
 
-from tankcal.recalibration.agreement import (
+from tankcal.products.recalibration.agreement import (
     compare_deliveries,
     coverage_factor,
     critical_correlation,

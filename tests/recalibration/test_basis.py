@@ -7,8 +7,12 @@ import pytest
 from tables_of_s1 import EDGES, HEIGHTS, PLATES, RADII, former_s1, new_s1, rings_m3
 
 from tankcal.errors import InputError
-from tankcal.recalibration.basis import TankFacts, bring_to_one_basis, interpolation_error_m3
-from tankcal.recalibration.former import FormerRoof, FormerTable
+from tankcal.products.recalibration.basis import (
+    TankFacts,
+    bring_to_one_basis,
+    interpolation_error_m3,
+)
+from tankcal.products.recalibration.former import FormerRoof, FormerTable
 
 S1 = TankFacts("vertical", HEIGHTS, PLATES)
 

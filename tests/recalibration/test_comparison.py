@@ -11,7 +11,7 @@ from draws import draws
 from tables_of_s1 import HEIGHTS, PLATES, RADII, former_s1, new_s1, rings_m3
 
 from tankcal.errors import InputError
-from tankcal.recalibration.comparison import Asked, compare, compare_files
+from tankcal.products.recalibration.comparison import Asked, compare, compare_files
 from tankcal.record.comparison import COMPARISON, STEPS, ComparisonFile
 from tankcal.record.schema import from_plain, to_plain
 

@@ -13,7 +13,7 @@ import pytest
 from written_pdfs import write_pdf
 
 from tankcal.errors import InputError
-from tankcal.recalibration.reading import read_former
+from tankcal.products.recalibration.reading import read_former
 from tankcal.tank.dips import dip_label
 
 HEIGHT = np.arange(0, 801) / 100

@@ -9,8 +9,8 @@ from histories import COMMON_U, dated_table, drawn_tables, inspections, radii_of
 from tables_of_s1 import HEIGHTS, PLATES, former_s1
 
 from tankcal.errors import InputError
-from tankcal.recalibration.comparison import compare
-from tankcal.recalibration.history import DatedTable, history_of
+from tankcal.products.recalibration.comparison import compare
+from tankcal.products.recalibration.history import DatedTable, history_of
 from tankcal.record.history import HISTORY, HistoryFile
 from tankcal.record.schema import from_plain, to_plain
 

@@ -12,7 +12,11 @@ from tables_of_s1 import former_s1
 
 from tankcal.cli import main
 from tankcal.errors import InputError
-from tankcal.recalibration.history_inputs import _worst_checks, find_files, history_of_files
+from tankcal.products.recalibration.history_inputs import (
+    _worst_checks,
+    find_files,
+    history_of_files,
+)
 from tankcal.record.history import HISTORY
 
 RECORDS = Path(__file__).parents[1] / "records" / "1"

@@ -12,10 +12,10 @@ from jacobians import assert_derivative
 
 import tankcal
 from tankcal.errors import InputError, SolutionError
-from tankcal.recalibration.read_table import read_table
-from tankcal.recalibration.seams import Fitting
-from tankcal.recalibration.solid_geometry import fit_lying
-from tankcal.recalibration.table_fit import State, find_computed_rows
+from tankcal.products.recalibration.read_table import read_table
+from tankcal.products.recalibration.seams import Fitting
+from tankcal.products.recalibration.solid_geometry import fit_lying
+from tankcal.products.recalibration.table_fit import State, find_computed_rows
 from tankcal.report.table_job import write_job
 
 PLATES = np.array([0.009, 0.008, 0.007, 0.006])

@@ -10,7 +10,7 @@ from test_solid_geometry import lying
 
 import tankcal
 from tankcal.cli import main
-from tankcal.recalibration.read_table import read_table
+from tankcal.products.recalibration.read_table import read_table
 
 pytestmark = pytest.mark.slow  # seconds of fits
 

@@ -5,14 +5,14 @@ import pytest
 
 import tankcal
 from tankcal.errors import InputError
-from tankcal.recalibration.former import FormerTable
-from tankcal.recalibration.solid_geometry import (
+from tankcal.products.recalibration.former import FormerTable
+from tankcal.products.recalibration.solid_geometry import (
     fit_lying,
     fit_sphere,
     size_sections,
     uncertainty_rows,
 )
-from tankcal.recalibration.table_job import make_solid_job
+from tankcal.products.recalibration.table_job import make_solid_job
 from tankcal.report.table_job import write_job
 
 SLICES = 4000

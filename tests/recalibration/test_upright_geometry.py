@@ -12,18 +12,18 @@ from former_tables import SimulatedTank, draw_tank, table_of
 from jacobians import assert_derivative
 from numpy.testing import assert_allclose
 
-from tankcal.recalibration.former import FormerRoof, FormerTable
-from tankcal.recalibration.seams import (
+from tankcal.products.recalibration.former import FormerRoof, FormerTable
+from tankcal.products.recalibration.seams import (
     Fitting,
     find_fittings,
     find_seams,
     find_zeros,
     pair_kinks_again,
 )
-from tankcal.recalibration.table_fit import Rows, State, row_sds
-from tankcal.recalibration.upright_geometry import read_upright
-from tankcal.recalibration.upright_search import drop_phantom_fittings
-from tankcal.recalibration.upright_shell import Rings
+from tankcal.products.recalibration.table_fit import Rows, State, row_sds
+from tankcal.products.recalibration.upright_geometry import read_upright
+from tankcal.products.recalibration.upright_search import drop_phantom_fittings
+from tankcal.products.recalibration.upright_shell import Rings
 
 HEIGHTS = np.array([1.8, 1.8, 1.8, 1.5, 1.5])
 PLATES = np.array([9.0, 8, 7, 6, 6]) / 1000

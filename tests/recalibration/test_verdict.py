@@ -8,7 +8,7 @@ from tables_of_s1 import HEIGHTS, PLATES, RADII, former_s1, new_s1
 
 from tankcal.job.rule_files import named_rule, parse_rule, shipped_rule
 from tankcal.job.tables import Log
-from tankcal.recalibration.comparison import compare
+from tankcal.products.recalibration.comparison import compare
 
 COURSES = HEIGHTS, PLATES
 YOUNG = {"date": "2020-05-20"}

@@ -16,7 +16,7 @@ from paper_words import texts_in, texts_of
 
 from tankcal.cli import main
 from tankcal.errors import InputError
-from tankcal.recalibration import verdict as verdicts
+from tankcal.products.recalibration import verdict as verdicts
 from tankcal.report import comparison
 from tankcal.report.comparison import ComparisonPaper, rebuild, write_comparison
 from tankcal.report.comparison.pages import correlation, delivery_rows, pages, side_rows, verdict

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from job_builder import write_job
 
-from tankcal.batch import steps
+from tankcal.products.batch import steps
 
 QUICK = {"table.step_m": 0.5, "certificate.number": "1"}
 DEADLY = "deadly"  # label of a job that ends its worker

@@ -346,7 +346,7 @@ def _make_runs(folder):
 
 
 def _inspection_files():
-    rules = EXAMPLES.parent / "tankcal" / "inspection" / "rules"
+    rules = EXAMPLES.parent / "tankcal" / "products" / "inspection" / "rules"
     files = {path.name: path.read_bytes() for path in (EXAMPLES / "inspection").glob("*.csv")}
     return files | {"rule.toml": (rules / "api_653.toml").read_bytes()}
 
@@ -365,7 +365,7 @@ def _make_results(folder):
     tall = [k / 20 for k in range(49)]
     solid = {"record.json": written_record(folder, tall, list(map(float, map(lying, tall))))
              .read_bytes()}  # fmt: skip
-    profiles = EXAMPLES.parent / "tankcal" / "exports" / "shipped_profiles"
+    profiles = EXAMPLES.parent / "tankcal" / "products" / "exports" / "shipped_profiles"
     profile = {"profile.toml": (profiles / "signet-9900.toml").read_bytes()}
     return {
         "verify": Base(("verify", "{in}/results", "--quiet"), whole, exact=tuple(whole),

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.recalibration.former import FormerTable
+from tankcal.products.recalibration.former import FormerTable
 
 GRAVITY, STEEL = 9.80665, 206e9
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)

@@ -6,7 +6,7 @@ from datetime import date
 import numpy as np
 from tables_of_s1 import RADII, new_s1, rings_m3
 
-from tankcal.recalibration.history import DatedTable, history_of
+from tankcal.products.recalibration.history import DatedTable, history_of
 from tankcal.record.history import CheckInHistory, InspectionInHistory
 from tankcal.record.schema import to_plain
 

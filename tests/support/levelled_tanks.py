@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tankcal.inspection.levelling import Epoch
-from tankcal.inspection.rules import SettlementLimits, Strength
+from tankcal.products.inspection.levelling import Epoch
+from tankcal.products.inspection.rules import SettlementLimits, Strength
 
 A_MM = (
     *(113.8, 109.5, 100.9, 97.1, 96.2, 87.1, 81.1, 82.4),

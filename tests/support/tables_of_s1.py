@@ -8,7 +8,7 @@ Rings of radius r and plate t below a dip h, K = g r^2 / (E t): pi times the int
 
 import numpy as np
 
-from tankcal.recalibration.former import FormerTable
+from tankcal.products.recalibration.former import FormerTable
 
 # readings of both straps; what butt straps and an obstruction add, mm; plate, mm; height, m
 COURSES = (

@@ -1,6 +1,6 @@
 """One simulated survey written in each format of instruments, by the public descriptions of these.
 
-Nothing of `tankcal.fieldbooks` is used: what is written here is read there.
+Nothing of `tankcal.products.fieldbooks` is used: what is written here is read there.
 
     written(survey, "gsi16")    the text of a file
 

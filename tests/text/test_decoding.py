@@ -8,8 +8,8 @@ from conftest import EXAMPLE
 
 import tankcal
 from tankcal.cli import main
+from tankcal.products.workbench.draft import Draft
 from tankcal.text.delimited import decode_text, find_encoding, read_json
-from tankcal.workbench.draft import Draft
 
 FORMER = """
 [former]

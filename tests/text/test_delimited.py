@@ -7,9 +7,9 @@ import pytest
 
 from tankcal.job.folder import read_csv
 from tankcal.job.tables import Log
+from tankcal.products.workbench.tables import read_csv_table
 from tankcal.report.outputs.csv_files import write_rows
 from tankcal.text.delimited import guard_formula, unguard_formula, write_guarded
-from tankcal.workbench.tables import read_csv_table
 
 HOSTILE = ["=1+1", "+1-1", "-1+1|' /C calc'!A0", "@SUM(A1)", "\t=1", "  =1", "=HYPERLINK(1)"]
 HARMLESS = ["P1", "-0.25", "-0,25", "+3", "-1e-5", "-", "--", "'P1", "", "a=b"]

@@ -10,12 +10,12 @@ from job_builder import write_job, write_workbook
 import tankcal
 from tankcal.job.fields import Field
 from tankcal.job.tables import REGISTERS, TABLES
+from tankcal.products.workbench import desk
+from tankcal.products.workbench.computing import Refusal, Run, Stopped
+from tankcal.products.workbench.desk import Desk, open_job
+from tankcal.products.workbench.plain import warnings_page
+from tankcal.products.workbench.tables import AmbiguousNumber, text_for_display, text_for_file
 from tankcal.text.shipped import LANGUAGES
-from tankcal.workbench import Refusal, desk, open_job
-from tankcal.workbench.computing import Run, Stopped
-from tankcal.workbench.desk import Desk
-from tankcal.workbench.plain import warnings_page
-from tankcal.workbench.tables import AmbiguousNumber, text_for_display, text_for_file
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NUMBER = Field("x_m", "number", "")
@@ -159,7 +159,7 @@ def test_who_looks_on_is_found_out(monkeypatch):
 def live_grid(folder, name, language="en"):
     pytest.importorskip("ipywidgets")
     pytest.importorskip("anywidget")
-    from tankcal.workbench.panels import TableGrid
+    from tankcal.products.workbench.panels import TableGrid
 
     made = open_job(folder, language=language, live=True)
     return made, TableGrid(made, name)
@@ -382,7 +382,7 @@ def test_desk_lists_its_tables(folder):
 
 def test_an_app_ends_what_a_closed_page_leaves_and_keeps_an_open_one(monkeypatch):
     app = pytest.importorskip("voila.app")
-    from tankcal.workbench import serving
+    from tankcal.products.workbench import serving
 
     asked = []
     monkeypatch.setattr(app.Voila, "launch_instance", lambda _, config: asked.append(config))

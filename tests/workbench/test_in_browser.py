@@ -17,7 +17,7 @@ from background import heed_ctrl_c
 from browser import THIS_MACHINE, Browser
 from job_builder import write_job
 
-from tankcal.workbench import serving
+from tankcal.products.workbench import serving
 
 pytestmark = pytest.mark.slow
 SLOW_S = 120  # a loaded machine starts a kernel and its page within

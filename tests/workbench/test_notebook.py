@@ -14,8 +14,8 @@ from nbclient.exceptions import CellExecutionError
 
 import tankcal
 from tankcal.cli import main
+from tankcal.products.workbench.serving import make_notebook
 from tankcal.text.shipped import LANGUAGES
-from tankcal.workbench.serving import make_notebook
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -112,7 +112,7 @@ def test_bad_arguments_are_told_in_a_line(folder, tmp_path, capsys, arguments, t
 
 
 def test_what_is_not_installed_is_told_in_a_line(folder, capsys, monkeypatch):
-    from tankcal.workbench import serving
+    from tankcal.products.workbench import serving
 
     monkeypatch.setattr(serving, "find_spec", lambda name: None)
     assert main(["notebook", str(folder)]) == 0
@@ -127,7 +127,7 @@ def test_what_is_not_installed_is_told_in_a_line(folder, capsys, monkeypatch):
      ("0.0.0.0", True), ("192.168.0.7", True)],
 )  # fmt: skip
 def test_the_app_warns_of_an_open_address(folder, capsys, monkeypatch, address, is_open):
-    from tankcal.workbench import serving
+    from tankcal.products.workbench import serving
 
     served = []
     monkeypatch.setattr(serving, "has_app", lambda: True)
@@ -146,7 +146,7 @@ def test_the_app_warns_of_an_open_address(folder, capsys, monkeypatch, address, 
     "arguments", [["--port", "0"], ["--port", "70000"], ["--port", "x"], ["--address", "300.1.1.1"]]
 )
 def test_bad_addresses_are_told(folder, capsys, monkeypatch, arguments):
-    from tankcal.workbench import serving
+    from tankcal.products.workbench import serving
 
     monkeypatch.setattr(serving, "has_app", lambda: True)
     monkeypatch.setattr(serving, "serve_app", lambda *given: pytest.fail("served"))

@@ -13,15 +13,15 @@ import tankcal
 from tankcal.errors import InputError, Problem
 from tankcal.job.model import Overruling
 from tankcal.messages import message
+from tankcal.products.workbench.views import page as pages
+from tankcal.products.workbench.views import results_view
+from tankcal.products.workbench.views.calculator import Calculator, parse_number
+from tankcal.products.workbench.views.page import SavedView, wall_page
+from tankcal.products.workbench.views.what_if import budget_sentences, change_budget, table_html
 from tankcal.record import record_of
 from tankcal.report.paper import Paper
 from tankcal.report.tables.capacity import capacity_rows, capacity_table
 from tankcal.text.shipped import LANGUAGES
-from tankcal.workbench.views import page as pages
-from tankcal.workbench.views import results_view
-from tankcal.workbench.views.calculator import Calculator, parse_number
-from tankcal.workbench.views.page import SavedView, wall_page
-from tankcal.workbench.views.what_if import budget_sentences, change_budget, table_html
 
 TURN = np.radians(7.5)
 DENT = ("dent", 6.46 * np.sin(TURN), 6.46 * np.cos(TURN), 5.225)
@@ -186,7 +186,7 @@ def test_a_saved_view_is_one_page_that_asks_for_nothing(paper):
 
 
 def test_without_widgets_there_is_the_page(monkeypatch, result, record):
-    from tankcal.workbench import views
+    from tankcal.products.workbench import views
 
     monkeypatch.setattr(views, "find_spec", lambda name: None)
     assert isinstance(results_view(result, record), SavedView)
@@ -238,7 +238,7 @@ def heard():
 
 @pytest.fixture
 def points(widgets, english, heard):
-    from tankcal.workbench.views.panels import PointsPanel
+    from tankcal.products.workbench.views.panels import PointsPanel
 
     return PointsPanel(english, lambda *given: heard.append(given))
 
@@ -282,7 +282,7 @@ def test_nothing_is_decided_about_nothing(points):
 
 
 def test_a_refusal_is_said(widgets, english):
-    from tankcal.workbench.views.panels import PointsPanel
+    from tankcal.products.workbench.views.panels import PointsPanel
 
     def refuse(*_given):
         raise InputError(Problem("overrulings.csv", message("overruled_nothing", "blank <b>")))
@@ -295,7 +295,7 @@ def test_a_refusal_is_said(widgets, english):
 
 
 def test_nobody_decides_where_nobody_listens(widgets, english):
-    from tankcal.workbench.views.panels import PointsPanel
+    from tankcal.products.workbench.views.panels import PointsPanel
 
     panel = PointsPanel(english, None)
     assert panel.reason not in panel.box.children
@@ -309,7 +309,7 @@ def test_the_whole_view(widgets, result, record, heard):
 
 def test_picture_and_list_look_at_the_same_point(widgets, result, english):
     pytest.importorskip("anywidget")
-    from tankcal.workbench.views.panels import wall_part
+    from tankcal.products.workbench.views.panels import wall_part
 
     box = wall_part(result, english, wall_page(english), None)
     frame = box.children[1]
@@ -318,7 +318,7 @@ def test_picture_and_list_look_at_the_same_point(widgets, result, english):
 
 
 def test_sliders_of_the_budget(widgets, result, paper):
-    from tankcal.workbench.views.what_if import BudgetPanel
+    from tankcal.products.workbench.views.what_if import BudgetPanel
 
     panel = BudgetPanel(result, paper)
     before = panel.totals.value
@@ -337,7 +337,7 @@ def test_sliders_of_the_budget(widgets, result, paper):
 
 
 def test_without_anywidget_a_page_is_still_framed(monkeypatch, widgets, english):
-    from tankcal.workbench.views import panels
+    from tankcal.products.workbench.views import panels
 
     monkeypatch.setattr(panels, "find_spec", lambda name: None)
     assert "srcdoc" in panels.frame_of(wall_page(english), "wall").value

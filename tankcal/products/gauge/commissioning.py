@@ -6,10 +6,9 @@ import numpy as np
 
 from tankcal.adjust import CRITICAL
 from tankcal.errors import Problem
-from tankcal.exports.exporting import gauge_correction, shortening_m
 from tankcal.gum.components import Source
-from tankcal.inspection.verdict import probability_of, verdict_of
 from tankcal.messages import message
+from tankcal.products.exports.exporting import gauge_correction, shortening_m
 from tankcal.products.gauge import saved
 from tankcal.products.gauge.deviation import (
     expand,
@@ -25,6 +24,7 @@ from tankcal.products.gauge.reading import (
     TAPE,
     shell_of,
 )
+from tankcal.products.inspection.verdict import probability_of, verdict_of
 from tankcal.products.settings import drop_blanks, fill_blanks
 from tankcal.record.texts import warnings_of
 

@@ -8,7 +8,6 @@ import numpy as np
 from tankcal import record as records
 from tankcal.adjust import CRITICAL
 from tankcal.errors import InputError, Problem
-from tankcal.exports.exporting import shortening_m
 from tankcal.gum.coverage import coverage_factor
 from tankcal.job.checking import missing_beside
 from tankcal.job.contract.keys import CSV
@@ -18,6 +17,7 @@ from tankcal.job.fields import Field
 from tankcal.job.folder import read_csv
 from tankcal.job.tables import Log, make_table, read_bytes, shown
 from tankcal.messages import message
+from tankcal.products.exports.exporting import shortening_m
 from tankcal.products.gauge.deviation import LEAST_LEVELS, Dips, KnownSlope, slope_of_tilt
 from tankcal.products.gauge.saved import GaugeCourse, GaugeRecord
 from tankcal.products.settings import fill_blanks, read_sections

@@ -1,1 +1,0 @@
-"""Inspection by the calibration survey: plumbness, roundness, peaking and settlement with U."""

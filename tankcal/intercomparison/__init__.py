@@ -1,1 +1,0 @@
-"""Comparison of software: random tanks, simulated surveys, sealed volumes, answers and scores."""

@@ -1,0 +1,400 @@
+"""Assemble an inspection: figures and verdicts of all parts as an `InspectionFile`."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from tankcal.errors import Problem
+from tankcal.job.folder import OF_INSPECTIONS
+from tankcal.job.tables import Log
+from tankcal.messages import message
+from tankcal.pipeline.clouds.passes import Reading
+from tankcal.products.inspection.basis import RECORD, read_basis
+from tankcal.products.inspection.edges import assess_edges
+from tankcal.products.inspection.levelling import read_edge_profiles, read_settlement
+from tankcal.products.inspection.rules import (
+    DEFAULT,
+    bulge_limits,
+    edge_limits,
+    find_rule,
+    limit_of,
+    settlement_limits,
+)
+from tankcal.products.inspection.settlement import assess_settlement
+from tankcal.products.inspection.shape import LEAST_READ, empty_wall_figures, inspect_shape
+from tankcal.products.inspection.verdict import Figure, make_check
+from tankcal.products.inspection.weld_gaps import empty_gaps, find_gaps
+from tankcal.products.inspection.welds import list_welds
+from tankcal.record import content_error
+from tankcal.record.inspection import InspectedTank, InspectionFile, InspectionRule
+from tankcal.record.texts import WarningRecord, warnings_of
+
+NOMINALS = ("drawing", "mean")  # sources of the nominal radius
+OFF_NOMINAL_MM = 5.0  # deviation of the mean radius that is within building tolerances
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Input and options of an inspection.
+
+    Attributes
+    ----------
+    source : path
+        A job, a record.json, or a folder of results.
+    rule : str or None
+        Name of a shipped rule or path of a rule file. If None, the rule of the job, or DEFAULT.
+    nominal : str
+        One of NOMINALS: the radii are compared with the radius of the drawing or with their mean.
+    settlement, edges : path or None
+        settlement.csv and edge_profiles.csv. If None, files of these names in the folder of a job.
+    yield_pa : float or None
+        Yield stress of the shell's steel, Pa. If None, the yield stress that the job states.
+    """
+
+    source: str | Path
+    rule: str | None = None
+    nominal: str = "drawing"
+    settlement: str | Path | None = None
+    edges: str | Path | None = None
+    yield_pa: float | None = None
+
+
+def inspect_files(asked, progress=None, part_progress=None) -> InspectionFile:
+    """Inspect a tank by its survey.
+
+    Parameters
+    ----------
+    asked : Asked
+        Input and options.
+    progress, part_progress : callable, optional
+        Callbacks as in `tankcal.run`.
+
+    Returns
+    -------
+    record.inspection.InspectionFile
+
+    Raises
+    ------
+    InputError
+        If the rule, the tables, the job or the record have problems, or if an older record does
+        not contain the shape of its wall. The error lists all problems.
+    SolutionError
+        As in `tankcal.run`.
+
+    Examples
+    --------
+    >>> from tankcal.products.inspection.inspecting import Asked, inspect_files
+    >>> inspection = inspect_files(Asked("examples/silva-1995"))
+    >>> [(check.code, check.verdict) for check in inspection.checks[:2]]
+    [('plumbness_axis', 'passed'), ('plumbness_generatrix', 'guard_band')]
+    """
+    log, progress = Log(), progress or (lambda text: None)
+    rule = None if asked.rule is None else find_rule(asked.rule, log)
+    files = _levelling_paths(asked)
+    _check_levellings(files, log)  # report their problems before a long computation of the survey
+    log.stop_if_problems()
+    basis = read_basis(asked.source, progress, part_progress)
+    rule = rule or _rule_of_job(basis, log)
+    if basis.is_older and files == (None, None):
+        log.problem(basis.file, _older_message())
+    log.stop_if_problems()
+    strength = basis.strength
+    if asked.yield_pa is not None:
+        strength = replace(strength, yield_pa=asked.yield_pa)
+    bottom = inspect_bottom(*files, strength, rule.sections, log)
+    log.stop_if_problems()
+    welds = _welds(basis, rule, part_progress, progress)
+    try:
+        inspection = assemble_inspection(basis, rule, bottom, welds, nominal=asked.nominal)
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        if basis.survey is not None:
+            raise
+        raise content_error(basis.file, error) from error
+    older = [_older_warning(basis)] if basis.is_older else []
+    return replace(
+        inspection, warnings=[*inspection.warnings, *warnings_of([*log.warnings, *older])]
+    )
+
+
+def _levelling_paths(asked):
+    """Paths of the two levelling tables, given or in the folder of a job; None for no table."""
+    source, paths = Path(asked.source), []
+    folder = source if source.is_dir() else source.parent
+    is_job = not ((source / RECORD).is_file() or source.suffix.lower() == ".json")
+    for given, name in zip((asked.settlement, asked.edges), OF_INSPECTIONS, strict=True):
+        beside = folder / name if is_job and (folder / name).is_file() else None
+        paths.append(beside if given is None else Path(given))
+    return tuple(paths)
+
+
+def _check_levellings(files, log):
+    """Report the problems of the levelling tables to `log`."""
+    alone = Log()  # drops the warnings, which are reported again with the figures
+    settlement, edges = files
+    if settlement is not None:
+        read_settlement(settlement, alone)
+    if edges is not None:
+        read_edge_profiles(edges, alone)
+    log.problems += alone.problems
+
+
+def _rule_of_job(basis, log):
+    """Rule that a job names, or the default rule; None if `log` received a problem of the rule."""
+    name = basis.rule or DEFAULT
+    is_file = name.lower().endswith(".toml")
+    return find_rule(str(basis.folder / name) if is_file else name, log)
+
+
+def _welds(basis, rule, part_progress, progress):
+    """`WeldGaps` at the welds, from the clouds of a job or without any determined gap."""
+    if basis.survey is not None:
+        gap_limits = {code: limit_of(rule, code) for code in ("peaking", "banding")}
+        limits = {code: entry.value for code, entry in gap_limits.items() if entry is not None}
+        return find_gaps(basis.survey, limits, Reading(None, part_progress), progress)
+    given_rad = [entry.get("welds_rad") or () for entry in basis.job["courses"]]
+    return empty_gaps(list_welds(basis.courses_m, given_rad), "gap_no_cloud")
+
+
+def assemble_inspection(basis, rule, bottom=None, welds=None, *, nominal="drawing"):
+    """Build the `InspectionFile` from the results of all parts.
+
+    Parameters
+    ----------
+    basis : basis.Basis
+        Job or record, with the shape of the wall.
+    rule : rules.Rule or None
+        Rule with the limits; None for figures without limits.
+    bottom : Bottom, optional
+        Results of the levellings.
+    welds : weld_gaps.WeldGaps, optional
+        Gaps at the welds.
+    nominal : str
+        One of NOMINALS.
+
+    Returns
+    -------
+    record.inspection.InspectionFile
+    """
+    sizes, problems, bottom = basis.sizes, [], bottom or Bottom()
+    if nominal == "mean":
+        sizes = replace(sizes, nominal_radius_m=None)
+    if basis.shape is None:
+        figures, generatrices, levels = (
+            empty_wall_figures(rule, sizes, "wall_not_surveyed"),
+            None,
+            [],
+        )
+    else:
+        figures, generatrices, levels = inspect_shape(basis.shape, sizes, rule)
+        problems += _warn_about_shape(basis, sizes, levels)
+    if welds is not None:
+        figures += [_gap_figure(item, limit_of(rule, item.code)) for item in welds.figures]
+    checks = [make_check(item) for item in (*figures, *bottom.figures)]  # in the order of CHECKS
+    return InspectionFile(
+        notice=basis.job["certificate"].get("notice") or "",
+        tank=_tank_record(basis, sizes, levels),
+        rule=_rule_record(rule),
+        as_built=bottom.as_built,
+        checks=checks,
+        generatrices=generatrices,
+        levels=levels,
+        gaps=[] if welds is None else list(welds.gaps),
+        settlements=list(bottom.settlements),
+        edges=list(bottom.edges),
+        warnings=[*(WarningRecord(**item) for item in basis.warnings), *warnings_of(problems)],
+    )
+
+
+def _gap_figure(gap, limit):
+    """`Figure` of a `weld_gaps.GapFigure`."""
+    return Figure(
+        code=gap.code,
+        unit="mm",
+        value=gap.value_mm,
+        U=gap.U_mm,
+        k=gap.k,
+        dof=np.inf,
+        limit=limit,
+        course=gap.course,
+        height_m=gap.height_m,
+        azimuth_deg=gap.azimuth_deg,
+        used=gap.used,
+        remark=gap.remark,
+        remark_values=gap.remark_values,
+    )
+
+
+def _tank_record(basis, sizes, levels):
+    """`InspectedTank` of the file."""
+    survey, is_surveyed = basis.job["survey"] or {}, basis.shape is not None
+    by_drawing = sizes.nominal_radius_m is not None
+    mean_m = 2 * float(np.mean([level.mean_radius_m for level in levels])) if levels else None
+    return InspectedTank(
+        id=basis.job["tank"]["id"],
+        name=basis.job["source"],
+        source=basis.source,
+        file=basis.file,
+        sha256=basis.sha256,
+        survey_date=survey.get("date"),
+        survey_side=survey.get("side") if is_surveyed else None,
+        methods=list(basis.methods),
+        nominal_diameter_m=sizes.diameter_m if by_drawing else mean_m,
+        nominal_source="drawing" if by_drawing else "mean" if is_surveyed else "none",
+        height_m=sizes.height_m or None,
+        state=basis.shape["state"] if is_surveyed else "as_found",
+    )
+
+
+def _rule_record(rule):
+    """`InspectionRule` of the file, or None without a rule."""
+    if rule is None:
+        return None
+    return InspectionRule(rule.name, rule.file, rule.source, rule.verified, rule.remark)
+
+
+def _warn_about_shape(basis, sizes, levels):
+    """Warnings about the shape of a wall."""
+    if sizes.nominal_radius_m is not None:
+        yield from _warn_about_nominal(basis, sizes, levels)
+    yield from _warn_about_rejected(basis)
+    plumb_lines = [*basis.shape["plumbs"][-1:], *basis.shape["courses"]]
+    if any(sum(plumb["is_read"]) < LEAST_READ for plumb in plumb_lines):
+        text = message(
+            "inspect_between_readings",
+            "fewer than {least} generatrices have readings at both ends: the plumb is estimated "
+            "between readings, where a dent may be missed; of simulated walls just beyond a limit "
+            "about 6 in 100 passed, not 2.5",
+            least=LEAST_READ,
+        )
+        yield Problem(basis.file, text)
+
+
+def _warn_about_nominal(basis, sizes, levels):
+    """Warning if the mean radii of all levels deviate alike from the nominal radius."""
+    means = [1000 * (level.mean_radius_m - sizes.nominal_radius_m) for level in levels]
+    spread = max(means) - min(means)
+    middle = sum(means) / len(means)
+    if abs(middle) > max(2 * spread, OFF_NOMINAL_MM):
+        text = message(
+            "inspect_nominal",
+            "the mean radii are {miss_mm:+.1f} mm from the nominal one, at all levels alike: that "
+            "is in every departure; is the nominal diameter what was built? --nominal mean takes "
+            "it off",
+            miss_mm=middle,
+        )
+        yield Problem(basis.file, text, column="tank.nominal_diameter_m")
+
+
+def _warn_about_rejected(basis):
+    """Warning about rejected points near the wall, which enter no check."""
+    rejected = basis.shape["set_aside"]
+    if not rejected:
+        return
+    worst = max(rejected, key=lambda point: abs(point["residual_mm"]))
+    text = message(
+        "inspect_set_aside",
+        "{count} points near the wall were not taken for it and are not judged, the farthest "
+        "{point} ({residual_mm:+.1f} mm, {height_m:.2f} m up, azimuth {azimuth_deg:.0f} deg): "
+        "fittings or slips, or a dent? look there",
+        count=len(rejected),
+        **worst,
+    )
+    yield Problem(basis.file, text)
+
+
+def _older_message():
+    """Message that an older record cannot be inspected."""
+    return message(
+        "inspect_older_record",
+        "a record of a version that did not keep the shape of its wall (radii by azimuth and "
+        "height with their covariance); expected its job, or the record of a new run",
+    )
+
+
+def _older_warning(basis):
+    """Warning that only the levellings of an older record are inspected."""
+    text = message(
+        "inspect_older_record_alone",
+        "a record of a version that did not keep the shape of its wall: only what was levelled is "
+        "inspected; the rest needs its job, or the record of a new run",
+    )
+    return Problem(basis.file, text)
+
+
+# ---- settlement of the foot, edge and bulges of the bottom
+
+
+@dataclass(frozen=True)
+class Bottom:
+    """Results of the levellings of a tank.
+
+    Attributes
+    ----------
+    settlements : tuple of record.inspection.Settlement
+        Each epoch, then the differences between epochs.
+    edges : tuple of record.inspection.EdgeProfile
+    figures : tuple of verdict.Figure
+        Figures of each epoch in the order of the checks; edge and bulge last.
+    """
+
+    settlements: tuple = ()
+    edges: tuple = ()
+    figures: tuple = ()
+
+    @property
+    def as_built(self):
+        """Whether differences to an earlier epoch remove the form of the tank as built."""
+        return any(settlement.since is not None for settlement in self.settlements)
+
+
+def inspect_bottom(settlement, edges, strength, sections, log) -> Bottom:
+    """Read settlement.csv and edge_profiles.csv, and compute their figures.
+
+    Parameters
+    ----------
+    settlement, edges : path or None
+        The files; None if not levelled.
+    strength : rules.Strength
+        Diameter, height and steel of the tank. A levelled tank without a diameter is a problem.
+    sections : dict
+        {section: {key: value}} of the rule. Without the section "settlement", "edge" or "bulge",
+        its figures have no limits.
+    log : Log
+        Receives the problems and warnings of both files.
+
+    Returns
+    -------
+    Bottom
+        Empty if the files have problems.
+
+    Examples
+    --------
+    >>> from tankcal.products.inspection.rules import Strength
+    >>> from tankcal.job.tables import Log
+    >>> tank = Strength(13.0, 9.5, yield_pa=250e6, e_pa=206e9)
+    >>> bottom = inspect_bottom("examples/inspection/settlement.csv", None, tank, {}, Log())
+    >>> [settlement.epoch for settlement in bottom.settlements], bottom.as_built
+    (['2019-03-11', '2026-05-04', '2026-05-04'], True)
+    """
+    problem_count = len(log.problems)
+    levelling = None if settlement is None else read_settlement(settlement, log)
+    lines = None if edges is None else read_edge_profiles(edges, log)
+    is_levelled = not (settlement is None and edges is None)
+    if is_levelled and strength.diameter_m is None:
+        text = message("bottom_no_diameter", "missing; settlement and edges are held against the"
+                       " size of the tank, expected its diameter")  # fmt: skip
+        log.problem(Path(settlement or edges).name, text, None, "nominal_diameter_m")
+    if len(log.problems) > problem_count:
+        return Bottom()
+    settlements, figures, profiles = [], [], []
+    if levelling is not None:
+        limits = settlement_limits(sections.get("settlement"))
+        settlements, figures = assess_settlement(levelling, strength, limits, log)
+    if lines is not None:
+        limits = edge_limits(sections.get("edge")), bulge_limits(sections.get("bulge"))
+        profiles, edge_figures = assess_edges(
+            lines, strength.diameter_m / 2, *limits, file=Path(edges).name, log=log
+        )
+        figures = [*figures, *edge_figures]
+    return Bottom(tuple(settlements), tuple(profiles), tuple(figures))

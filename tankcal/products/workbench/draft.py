@@ -1,0 +1,468 @@
+"""Editing of a job: its files on the disk and in their edited state.
+
+draft = Draft.open("my-tank")
+draft.set_cells("points", [(0, "x_m", "6.5021")])
+draft.check().problems
+draft.save()
+"""
+
+import hashlib
+import os
+import tempfile
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from tankcal.errors import InputError, Problem
+from tankcal.job.contract import COLUMNS, KINDS, columns_of
+from tankcal.job.folder import csv_marks, decode, parsed_toml, read_toml, results_given_as_job
+from tankcal.job.loading import load_edited
+from tankcal.job.tables import (
+    REGISTERS,
+    SETTINGS_FILE,
+    TABLES,
+    WORKBOOK_FILE,
+    Log,
+    meant,
+    read_beside,
+    read_bytes,
+)
+from tankcal.messages import message
+from tankcal.products.workbench.findings import Check, mark_cells
+from tankcal.products.workbench.keys import (
+    READ_ONLY_SECTIONS,
+    SETTINGS,
+    EditedKeys,
+    new_sheet_table,
+    read_book,
+    write_book,
+)
+from tankcal.products.workbench.tables import new_csv_table, read_csv_table
+from tankcal.text.delimited import WESTERN, decode_text, find_encoding, is_western
+
+AMBIGUOUS = message(
+    "entry_not_told_apart",
+    "which of two numbers is meant cannot be told from the decimal mark; expected the mark of the "
+    "language. The entry is not written",
+)
+READ_AS_COMMENT = message("entry_switches_off", "begins with #: the row is not read")
+FORMULAS = message(
+    "workbook_has_formulas",
+    "has formulas in the sheets of the job; edit it in Excel or LibreOffice, for their values "
+    "would be lost here",
+)
+MOST_UNDO = 200  # number of edits that Undo can revert
+
+
+def source_of(path):
+    """Folder or workbook of the job at a path; InputError if there is no job."""
+    path = Path(path)
+    is_settings = path.name == SETTINGS_FILE and path.is_file()
+    folder = path.parent if is_settings else path
+    with suppress(OSError, ValueError):
+        if folder.is_dir() and (folder / SETTINGS_FILE).is_file():
+            return folder
+        if (folder / WORKBOOK_FILE).is_file():
+            return folder / WORKBOOK_FILE
+        if path.suffix.lower() == ".xlsx" and path.is_file():
+            return path
+    no_job = message(
+        "no_job_to_open",
+        "no job there; expected a folder with job.toml or a workbook (.xlsx), such as tankcal new "
+        "writes",
+    )
+    raise InputError(Problem(path.name or str(path), results_given_as_job(path) or no_job))
+
+
+class Draft:
+    """State of the files of a job, with previous states for Undo.
+
+    Attributes
+    ----------
+    source : Path
+        Folder or workbook.
+    tables : dict of EditedTable
+        Tables of the job.
+    keys : dict of EditedKeys
+        The settings ("job"), and the existing lists of cameras, instruments, clouds and meters.
+    locked : Message or None
+        Reason why the job cannot be edited.
+    unreadable : list of Problem
+        Problems of files of keys that cannot be read, and therefore cannot be edited here.
+    """
+
+    def __init__(self, source):
+        self.source = source
+        self.is_book = source.is_file()
+        self.locked = None
+        self.unreadable = []
+        self._saved_bytes = {}  # {file: its bytes, None for a missing file}
+        self._saved = {}  # {name of a table or of keys: its state on the disk}
+        self._undo_states, self._marks = [], (",", ".")
+        self.tables, self.keys = {}, {}
+        if self.is_book:
+            self._read_book()
+        else:
+            self._read_folder()
+        self._saved = {**self.tables, **self.keys}
+
+    @classmethod
+    def open(cls, path):
+        """Open a job folder, its job.toml or a workbook; InputError if there is no job."""
+        return cls(source_of(path))
+
+    # ---- reading
+
+    def _content(self, name):
+        """Bytes of a file, None if it is missing or unreadable, which the check reports."""
+        path = self.source if self.is_book else self.source / name
+        data = read_beside(path.parent, path.name, Log()) if path.exists() else None
+        self._saved_bytes[name] = data
+        return data
+
+    def _read_folder(self):
+        """Read the tables and keys of a job folder."""
+        log = Log()
+        self.unreadable = log.problems
+        data = self._content(SETTINGS_FILE)
+        settings = None
+        if data is not None:
+            settings, _ = read_toml(SETTINGS_FILE, data, log)
+        if settings is not None and not log.problems:
+            self._add_keys(SETTINGS, SETTINGS_FILE, data)
+        marks = csv_marks(SETTINGS_FILE, settings or {}, Log())
+        for name in REGISTERS:
+            if (self.source / f"{name}.toml").is_file():
+                data = self._content(f"{name}.toml")
+                if data is not None and parsed_toml(f"{name}.toml", data, log) is not None:
+                    self._add_keys(name, f"{name}.toml", data)
+        if marks is None:
+            return
+        self._marks = marks
+        for name in TABLES:
+            file = f"{name}.csv"
+            if (self.source / file).is_file():
+                data = self._content(file)
+                text = None if data is None else _decode_with_mark(file, data)
+                if text is not None:
+                    self.tables[name] = read_csv_table(name, file, text, *marks)
+
+    def _add_keys(self, name, file, data):
+        """Add keys that both tomllib and tomlkit can read; other files are only checked."""
+        import tomlkit
+        from tomlkit.exceptions import TOMLKitError  # a key given twice is no ValueError
+
+        with suppress(ValueError, AttributeError, RecursionError, TOMLKitError):
+            text = decode_text(data)
+            tomlkit.parse(text)
+            edited_keys = EditedKeys(name, file, text)
+            if edited_keys.entries is not None:
+                self.keys[name] = edited_keys
+
+    def _read_book(self):
+        """Read the tables and keys of a workbook."""
+        data = self._content(self.source.name)
+        with suppress(Exception):  # the check reports a damaged file
+            self.tables, self.keys, has_formula = read_book(data, self._kind_of)
+            self.locked = FORMULAS if has_formula else None
+
+    # ---- content
+
+    @property
+    def kind(self):
+        """Kind of tank, or None if the settings do not state it."""
+        return self._kind_of(self.keys.get(SETTINGS))
+
+    @staticmethod
+    def _kind_of(settings):
+        """Kind of tank of the settings, also if misspelt, or None."""
+        kind = next(
+            (
+                entry.text
+                for entry in (settings.entries if settings is not None else ())
+                if (entry.owner, entry.key) == ("tank", "kind")
+            ),
+            "",
+        )
+        return kind if kind in KINDS else meant(kind, KINDS) if kind else None
+
+    def value(self, owner, key):
+        """Text of a key of the settings, or "" if it is not given."""
+        settings = self.keys.get(SETTINGS)
+        entries = settings.entries if settings is not None else ()
+        return next(
+            (entry.text for entry in entries if (entry.owner, entry.key) == (owner, key)), ""
+        )
+
+    def fields(self, name):
+        """Columns that a table may have, {heading: Field}."""
+        return {field.name: field for field in columns_of(name, self.kind)}
+
+    @property
+    def is_changed(self):
+        """Whether a file differs from the file on the disk."""
+        now = {**self.tables, **self.keys}
+        return any(state is not self._saved.get(name) for name, state in now.items()) or any(
+            name not in now for name in self._saved
+        )
+
+    # ---- edits
+
+    def set_cells(self, name, changes):
+        """Set the texts of cells, [(row, heading, text)], with rows counted from 0."""
+        table = self.tables[name]
+        places = [
+            (row, table.headings.index(heading), text)
+            for row, heading, text in changes
+            if 0 <= row < len(table.rows) and heading in table.headings
+        ]
+        self._store_undo()
+        self.tables[name] = table.set_cells(places)
+
+    def insert_rows(self, name, place, count=1):
+        """Insert blank rows before row `place`."""
+        self._store_undo()
+        self.tables[name] = self.tables[name].insert_rows(place, count)
+
+    def remove_rows(self, name, places):
+        """Remove rows."""
+        self._store_undo()
+        self.tables[name] = self.tables[name].remove_rows(places)
+
+    def add_column(self, name, heading):
+        """Add a blank column at the right, unless it exists."""
+        if heading not in self.tables[name].headings:
+            self._store_undo()
+            self.tables[name] = self.tables[name].add_column(heading)
+
+    def add_table(self, name, headings=None):
+        """Add a table without rows; by default with the required columns."""
+        required = [
+            field.name for field in COLUMNS[name] if field.suits(self.kind) and field.required
+        ]
+        required = headings or required or [field.name for field in columns_of(name, self.kind)]
+        self._store_undo()
+        if self.is_book:
+            self.tables[name] = new_sheet_table(name, required, self.kind)
+            return
+        self._saved_bytes.setdefault(f"{name}.csv", None)
+        self.tables[name] = new_csv_table(name, f"{name}.csv", required, *self._marks)
+
+    def set_value(self, name, owner, key, text):
+        """Set the value of a key of the settings or of a list.
+
+        Parameters
+        ----------
+        name : str
+            "job" or the name of a list.
+        owner, key : str
+            Section or list entry, and key.
+        text : str
+            Text in the file.
+
+        Raises
+        ------
+        InputError
+            If the key cannot be edited here.
+        """
+        from tomlkit.exceptions import TOMLKitError
+
+        keys = self.keys[name]
+        if owner in READ_ONLY_SECTIONS:
+            self._refuse_edit(keys, owner, key)
+        try:
+            state = keys.set_value(owner, key, text)
+        except (TOMLKitError, ValueError, LookupError, TypeError, AttributeError):
+            self._refuse_edit(keys, owner, key)
+        self._store_undo()
+        self.keys[name] = state
+
+    @staticmethod
+    def _refuse_edit(keys, owner, key):
+        """Raise InputError for a key that cannot be edited here."""
+        expected = message("key_not_edited_here", "cannot be edited here; edit the file itself")
+        raise InputError(Problem(keys.file, expected, None, f"{owner}.{key}"))
+
+    def _store_undo(self):
+        """Store the state for Undo before an edit; InputError if the job is locked."""
+        if self.locked is not None:
+            raise InputError(Problem(self.source.name, self.locked))
+        self._undo_states.append((dict(self.tables), dict(self.keys)))
+        del self._undo_states[:-MOST_UNDO]
+
+    @contextmanager
+    def group_edits(self):
+        """Context in which all edits are a single edit for Undo, and are discarded on an error."""
+        state, before = (dict(self.tables), dict(self.keys)), [*self._undo_states]
+        try:
+            yield
+        except BaseException:
+            (self.tables, self.keys), self._undo_states = state, before
+            raise
+        if self._undo_states and (not before or self._undo_states[-1] is not before[-1]):
+            self._undo_states = [*before, state][-MOST_UNDO:]
+
+    def undo(self):
+        """Revert the last edit, and return whether there was an edit."""
+        if not self._undo_states:
+            return False
+        self.tables, self.keys = self._undo_states.pop()
+        return True
+
+    # ---- files
+
+    def edited_files(self):
+        """Files that differ from the disk, {file: bytes}, and row numbers, {table: numbers}."""
+        rendered = {name: table.render() for name, table in self.tables.items()}
+        numbers = {name: row_numbers for name, (_, row_numbers) in rendered.items()}
+        now = {**self.tables, **self.keys}
+        changed = [name for name, state in now.items() if state is not self._saved.get(name)]
+        if self.is_book:
+            if not changed:
+                return {}, numbers
+            file = self.source.name
+            tables = [self.tables[name] for name in changed if name in self.tables]
+            keys = [self.keys[name] for name in changed if name in self.keys]
+            return {file: write_book(self._saved_bytes[file], tables, keys)}, numbers
+        files = {now[name].file: now[name].render()[0] for name in changed}
+        return {
+            name: data for name, data in files.items() if data != self._saved_bytes[name]
+        }, numbers
+
+    def check(self):
+        """Check the job in its edited state, and return a `Check` with all problems by cell."""
+        files, numbers = self.edited_files()
+        problems, warnings, job = (), (), None
+        try:
+            job = load_edited(self.source, files)
+            warnings = job.warnings
+        except InputError as error:
+            problems = error.problems
+        ambiguous = [*self._ambiguous_values()]
+        # Of a value that is not written, only its own problem is reported.
+        places = {(problem.file, problem.row, problem.column) for problem in ambiguous}
+        problems = [
+            problem
+            for problem in problems
+            if (problem.file, problem.row, problem.column) not in places
+            and (problem.file, None, problem.column) not in places
+        ]
+        off = self._warn_about_comments(numbers)
+        return mark_cells(self, numbers, Check((*ambiguous, *problems), (*warnings, *off), job))
+
+    def _ambiguous_values(self):
+        """Yield a problem for each ambiguous value."""
+        for table in self.tables.values():
+            numbers = table.render()[1] if table.ambiguous else ()
+            for row, column in table.ambiguous:
+                yield Problem(table.file, AMBIGUOUS, numbers[row], table.headings[column])
+        for keys in self.keys.values():
+            for owner, key in keys.ambiguous:
+                yield Problem(keys.file, AMBIGUOUS, None, f"{owner}.{key}")
+
+    def _warn_about_comments(self, numbers):
+        """Warnings of rows that an edit made a comment."""
+        return [
+            Problem(table.file, READ_AS_COMMENT, numbers[name][place], table.headings[0])
+            for name, table in self.tables.items()
+            for place, row in enumerate(table.rows)
+            if row.changed and row.cells and row.cells[0].startswith("#")
+        ]
+
+    def save(self):
+        """Write the edited files, all or none of them.
+
+        Returns
+        -------
+        list of Path
+            Written files; empty if no file differs.
+
+        Raises
+        ------
+        InputError
+            If a value is ambiguous, or if another program has changed an edited file (any file, if
+            no file was edited).
+        """
+        ambiguous = [*self._ambiguous_values()]
+        if ambiguous:
+            raise InputError(ambiguous)
+        files, _ = self.edited_files()
+        folder, paths = self._folder, self._paths(files)
+        self.refuse_changed_elsewhere(files or self._saved_bytes)
+        _replace_files(
+            {paths[name]: data for name, data in files.items()}, self._saved_bytes, paths
+        )
+        self._saved_bytes.update(files)
+        if self.is_book and files:
+            self._read_book()
+            self._undo_states.clear()
+        self._saved = {**self.tables, **self.keys}
+        return [folder / name for name in files]
+
+    @property
+    def _folder(self):
+        """Folder of the files."""
+        return self.source.parent if self.is_book else self.source
+
+    def _paths(self, names):
+        """Absolute paths of files, {name: path}."""
+        return {name: (self._folder / name).resolve() for name in names}
+
+    def refuse_changed_elsewhere(self, names=None):
+        """Raise InputError if another program has changed one of these files, or any file."""
+        expected = message(
+            "changed_elsewhere",
+            "another program has changed the file since it was opened here; nothing was written. "
+            "Open the notebook again",
+        )
+        changed = []
+        for name, path in self._paths(self._saved_bytes if names is None else names).items():
+            data = read_bytes(path, Log()) if path.is_file() else None
+            if _digest(data) != _digest(self._saved_bytes[name]):
+                changed.append(Problem(name, expected))
+        if changed:
+            raise InputError(changed)
+
+
+def _decode_with_mark(file, data):
+    """Text of a CSV file with its byte order mark, or None if it cannot be decoded.
+
+    Edited files are written in UTF-8. A file in Windows-1252 gets a byte order mark, by which Excel
+    recognises UTF-8.
+    """
+    if is_western(data):
+        return f"\ufeff{data.decode(WESTERN)}"
+    return data.decode(find_encoding(data)) if decode(file, data, Log()) is not None else None
+
+
+def _digest(data):
+    """SHA-256 of bytes, or None for a missing file."""
+    return None if data is None else hashlib.sha256(data).hexdigest()
+
+
+def _replace_files(contents, before, paths):
+    """Replace files by {path: bytes}, all or none of them.
+
+    The new files are first written next to the files that they replace.
+    """
+    staged, done = {}, []
+    names = {path: name for name, path in paths.items()}
+    try:
+        for path, data in contents.items():
+            handle, temporary = tempfile.mkstemp(prefix=".tankcal-", dir=path.parent)
+            staged[path] = Path(temporary)
+            with os.fdopen(handle, "wb") as file:
+                file.write(data)
+            mode = path.stat().st_mode & 0o777 if path.exists() else 0o644
+            staged[path].chmod(mode)
+        for path, temporary in staged.items():
+            temporary.replace(path)
+            done.append(path)
+    except OSError:
+        # Restore the files that were already replaced.
+        for path in done:
+            data = before[names[path]]
+            path.unlink() if data is None else path.write_bytes(data)
+        raise
+    finally:
+        for temporary in staged.values():
+            temporary.unlink(missing_ok=True)

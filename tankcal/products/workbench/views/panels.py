@@ -1,0 +1,262 @@
+"""Widgets of a result: table and calculators, wall with rejected points, budget."""
+
+from html import escape
+from importlib.util import find_spec
+
+import ipywidgets as widgets
+import traitlets
+
+from tankcal.errors import InputError, TankcalError
+from tankcal.job.contract.overrulings import DECISIONS
+from tankcal.products.workbench.views.calculator import Calculator
+from tankcal.products.workbench.views.page import frame_html, table_page, wall_page
+from tankcal.products.workbench.views.what_if import BudgetPanel
+from tankcal.report.web.wall_map import list_inspected, reason_text
+from tankcal.text.words import say
+
+WIDE = {"width": "100%"}  # layout
+# Style that prevents truncated titles of tabs.
+WHOLE_TITLES = "<style>.tankcal-titled .lm-TabBar-tab { flex: 0 0 auto !important }</style>"
+
+
+def live_view(result, paper, on_overrule):
+    """Widget with all parts of the view as tabs."""
+    word = paper.word
+    parts = {"views.table": table_part(result, paper)}
+    wall = wall_page(paper)
+    if wall is not None or paper.record["rejected"]:
+        parts["views.wall"] = wall_part(result, paper, wall, on_overrule)
+    if result.table.sources:
+        parts["views.budget"] = BudgetPanel(result, paper).box
+    tabs = widgets.Tab(children=list(parts.values()), titles=[word(name) for name in parts])
+    view = widgets.VBox([widgets.HTML(WHOLE_TITLES), tabs], layout=WIDE)
+    view.add_class("tankcal-titled")
+    return view
+
+
+def frame_of(html, title):
+    """Widget with a page; without anywidget, it does not report the selected point."""
+    if find_spec("anywidget") is None:
+        return widgets.HTML(frame_html(html, title), layout=WIDE)
+    from tankcal.products.workbench.views.frame import Frame
+
+    return Frame(page=html, title=title)
+
+
+def table_part(result, paper):
+    """Widget with the calculators, and the table with its search below."""
+    page = table_page(paper, with_calculator=False)
+    table = frame_of(page, paper.word("views.table"))
+    return widgets.VBox([CalculatorPanel(result, paper).box, table])
+
+
+class CalculatorPanel:
+    """Three calculators: volume of a dip, dip of a volume, volume between two dips."""
+
+    def __init__(self, result, paper):
+        self.calculator = Calculator(result, paper)
+        word, heights = paper.word, result.table.height_m
+        middle = paper.height(float(heights[len(heights) // 2]), "")
+        unit = self.calculator.unit
+        self.dip = _field(word("views.dip_m"), middle)
+        self.volume = _field(word("views.volume_of", unit=unit))
+        self.low, self.high = _field(word("views.from_dip")), _field(word("views.to_dip"))
+        self.answers = {name: widgets.HTML() for name in ("volume", "dip", "delivery")}
+        asked = {
+            "volume": ([self.dip], self.calculator.volume_at),
+            "dip": ([self.volume], self.calculator.dip_of),
+            "delivery": ([self.low, self.high], self.calculator.delivery),
+        }
+        rows = []
+        for name, (fields, ask) in asked.items():
+            show = self._shower(name, fields, ask)
+            for field in fields:
+                field.observe(show, "value")
+            show()
+            heading = widgets.HTML(f"<b>{escape(word(f'views.asks_{name}'))}</b>")
+            rows.append(widgets.VBox([heading, widgets.HBox(fields), self.answers[name]]))
+        self.box = widgets.VBox(rows)
+
+    def _shower(self, name, fields, ask):
+        def show(_change=None):
+            texts = [field.value for field in fields]
+            is_asked = any(text.strip() for text in texts)
+            self.answers[name].value = _answer_html(ask(*texts)) if is_asked else ""
+
+        return show
+
+
+def _field(label, value=""):
+    return widgets.Text(
+        value=value,
+        description=label,
+        style={"description_width": "initial"},
+        layout={"width": "16rem"},
+    )
+
+
+def _answer_html(answer):
+    """HTML of an `Answer`."""
+    colour = ' style="color:#a01818"' if answer.is_refused else ' style="font-size:1.1em"'
+    facts = "".join(
+        f"<br><small>{escape(name)}: {escape(value)}</small>" for name, value in answer.facts
+    )
+    return f'<div role="status"{colour}>{escape(answer.text)}{facts}</div>'
+
+
+def wall_part(result, paper, page, on_overrule):
+    """List of rejected points and pictures of the wall, with a common selected point."""
+    points = PointsPanel(paper, on_overrule)
+    if page is None:
+        return points.box
+    frame = frame_of(page, paper.word("views.wall"))
+    if frame.has_trait("chosen"):
+        widgets.link((points, "chosen"), (frame, "chosen"))
+    return widgets.VBox([points.box, frame])
+
+
+class PointsPanel(traitlets.HasTraits):
+    """List of rejected points, the selected point, and buttons for decisions.
+
+    Parameters
+    ----------
+    paper : Paper
+        Texts and record of the result.
+    on_overrule : callable or None
+        Function on_overrule(point, decision, reason) that receives decisions; None for no buttons.
+    """
+
+    chosen = traitlets.Unicode()
+
+    def __init__(self, paper, on_overrule):
+        super().__init__()
+        self.paper, self.on_overrule = paper, on_overrule
+        self.points = {item.name: item for item in list_inspected(paper.record)}
+        self.used = {
+            point["point"]: point["residual_m"]
+            for point in paper.record["points"]
+            if point["used"] and point["residual_m"] is not None
+        }
+        word = paper.word
+        self.list = widgets.Select(
+            options=[(self._line(item), item.name) for item in self.points.values()],
+            value=None,
+            rows=min(max(len(self.points), 3), 10),
+            layout={"width": "60rem", "max_width": "100%"},
+        )
+        self.details, self.state = widgets.HTML(), widgets.HTML()
+        self.reason = widgets.Text(
+            placeholder=word("views.reason"),
+            layout={"width": "60rem", "max_width": "100%"},
+            continuous_update=True,
+        )
+        self.previous = _button("◀ " + word("views.previous"), lambda: self.step(-1))
+        self.next = _button(word("views.next") + " ▶", lambda: self.step(1))
+        self.decide = {
+            item: _button(word(f"views.{item}"), lambda item=item: self.overrule(item))
+            for item in DECISIONS
+        }
+        self.list.observe(lambda change: self._choose(change["new"]), "value")
+        self.observe(lambda change: self._show(), "chosen")
+        self.box = widgets.VBox(self._rows())
+        self._show()
+
+    def _rows(self):
+        """Widgets of the panel from top to bottom."""
+        word, count = self.paper.word, len(self.points)
+        heading = word("views.looked_at", count=count) if count else word("views.none_rejected")
+        rows = [widgets.HTML(f"<b>{escape(heading)}</b>")]
+        if count:
+            rows += [self.list, widgets.HBox([self.previous, self.next])]
+        rows.append(self.details)
+        if self.on_overrule is None:
+            return rows
+        return [*rows, self.reason, widgets.HBox(list(self.decide.values())), self.state]
+
+    # ---- selection
+
+    def step(self, by):
+        """Select the point `by` places further in the list, cyclically."""
+        names = list(self.points)
+        if not names:
+            return
+        start = -1 if by > 0 else 0
+        place = names.index(self.chosen) if self.chosen in self.points else start
+        self.chosen = names[(place + by) % len(names)]
+
+    def _choose(self, name):
+        """Select a point of the list."""
+        if name is not None:
+            self.chosen = name
+
+    def _show(self):
+        """Show the selected point."""
+        name = self.chosen
+        self.list.value = name if name in self.points else None
+        point, word = self.points.get(name), self.paper.word
+        is_known = point is not None or name in self.used
+        for button in self.decide.values():
+            button.disabled = not is_known
+        self.state.value = ""
+        if point is not None:
+            self.details.value = f"<div>{escape(self._sentence(point))}</div>"
+        elif name in self.used:
+            off = self.paper.number(self.used[name], "mm", decimals=1)
+            self.details.value = (
+                f"<div>{escape(word('views.point_used', point=name, off=off))}</div>"
+            )
+        else:
+            self.details.value = f"<div>{escape(word('views.choose_point'))}</div>"
+
+    def _line(self, point):
+        """Text of a point in the list: name, deviation and reason."""
+        parts = [point.name, self._deviation(point), reason_text(self.paper, point)]
+        return " · ".join(part for part in parts if part)
+
+    def _sentence(self, point):
+        """Text of the selected point, with test value and place."""
+        parts = [self._line(point)]
+        if point.w is not None:
+            parts.append(f"w = {self.paper.number(point.w, decimals=1)}")
+        if point.azimuth_deg is not None:
+            parts.append(f"{self.paper.number(point.azimuth_deg, decimals=1)}°")
+            parts.append(self.paper.number(point.height_m, "m", decimals=3))
+        return " · ".join(parts)
+
+    def _deviation(self, point):
+        """Text of the deviation of a point from the wall."""
+        if point.off_m is None:
+            return ""
+        return self.paper.number(point.off_m, "mm", decimals=1)
+
+    # ---- decisions
+
+    def overrule(self, decision):
+        """Pass on a decision about the selected point; a decision requires a reason."""
+        word, name = self.paper.word, self.chosen
+        reason = " ".join(self.reason.value.split())
+        if not reason:
+            self._state(word("views.no_reason"), "#a01818")
+            return
+        try:
+            self.on_overrule(name, decision, reason)
+        except InputError as error:
+            lines = [say(self.paper.words, text) for text in error.texts]
+            self._state("\n".join(lines), "#a01818")
+        except TankcalError as error:
+            self._state(str(error), "#a01818")
+        else:
+            self.reason.value = ""
+            self._state(word(f"views.decided_{decision}", point=name), "#14603c")
+
+    def _state(self, text, colour):
+        """Show a message below the buttons."""
+        lines = "<br>".join(map(escape, text.splitlines()))
+        self.state.value = f'<div role="status" style="color:{colour}">{lines}</div>'
+
+
+def _button(text, act):
+    """Button that calls act()."""
+    button = widgets.Button(description=text, layout={"width": "auto"})
+    button.on_click(lambda _: act())
+    return button

@@ -1,1 +1,0 @@
-"""Comparison and history of capacity tables of one tank, and the tank geometry behind a table."""
