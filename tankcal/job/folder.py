@@ -83,7 +83,7 @@ _DECIMAL_COMMA = re.compile(
     r"(\s*[\w.\"'-]+\s*=\s*[+-]?\d+),(\d+(?:[eE][+-]?\d+)?)\s*(?:#.*)?", re.DOTALL
 )
 _BARE_TEXT = re.compile(r"(\s*[\w.\"'-]+\s*=\s*)([^\s\"'\[\]{}#\\][^\"'\[\]{}#\\]*?)\s*(?:#.*)?")
-_DATE_OF_DAYS = re.compile(r"(\d{1,2})[/.-](\d{1,2})[/.-](\d{4})")
+_INVALID_DATE = re.compile(r"\d{1,2}[/.-]\d{1,2}[/.-]\d{4}|\d{4}[/.-]\d{1,2}[/.-]\d{1,2}")
 
 
 def read_folder(folder, log, edited=None):
@@ -372,7 +372,7 @@ def _content(file, text, log):
             bare = _BARE_TEXT.fullmatch(lines[row - 1]) if row and is_bare else None
             if bare is not None and number is None:
                 log.problem(file, _bare_value(bare[2]), row)
-                date = _DATE_OF_DAYS.fullmatch(bare[2])
+                date = _INVALID_DATE.fullmatch(bare[2])
                 lines[row - 1] = bare[1] + ("2000-01-01" if date else f'"{bare[2]}"')
                 continue
             if number is None:
@@ -397,7 +397,7 @@ def _content(file, text, log):
 
 def _bare_value(text):
     """Message about a value that is neither number nor date and has no quotation marks."""
-    if _DATE_OF_DAYS.fullmatch(text):
+    if _INVALID_DATE.fullmatch(text):
         return message("date_in_toml", "found {text}; expected a date as year-month-day, such as "
                        "2024-05-31", text=text)  # fmt: skip
     if text[0].isdigit():

@@ -115,7 +115,7 @@ SPOILT = {
     "participant.toml": [
         ("name = ", "nome = ", "unknown key"),
         ('software = "hand"', 'software = ""', "software"),
-        ("date = 2026-05-05", "date = 2026-15-05", "cannot be read"),
+        ("date = 2026-05-05", "date = 2026-15-05", "found 2026-15-05; expected a date"),
         ("[participant]", "[participants]", "unknown section"),
         ("[participant]", '[csv]\nseparator = ";"\ndecimal = ";"\n[participant]', "decimal"),
     ],
