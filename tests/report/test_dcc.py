@@ -257,3 +257,34 @@ def test_pydcc_reads_it(pydcc, tmp_path, example):
 def test_digest_of_the_file_is_that_of_the_record(example_record, example):
     digest = sha256(example_record.read_bytes())
     assert f"sha256:{digest}" in dcc.certificate_xml(example, digest).decode()
+
+
+def test_operating_levels_have_the_volumes_of_the_record(structure, example):
+    """A level and a volume between two levels; without a valid k, U is a separate quantity."""
+    record = copy.deepcopy(example)
+    below = next(entry for entry in record["budgets"] if entry["low_m"] is None)
+    between = next(entry for entry in record["budgets"] if entry["low_m"] is not None)
+    between |= {"interval": "monte_carlo"}
+    below |= {"interval": "gum"}
+    record["limits"] = [
+        {"code": code, "low_m": entry["low_m"], "high_m": entry["high_m"]}
+        for code, entry in (("maximum", below), ("working_capacity", between))
+    ]
+    xml = certificate_of(record)
+    assert problems(structure, xml) == []
+    levels = tree(xml).findall(".//dcc:list[@refType='tankcal_limit']", NAMES)
+    first, second = levels
+    text = first.find("dcc:name/dcc:content[@lang='pt']", NAMES).text
+    assert text == load_words("pt-BR")["tank_limits"]["maximum"]
+
+    def values(element, path):
+        return [float(found.text) for found in element.findall(f".//si:{path}", NAMES)]
+
+    assert values(first, "real/si:value") == [below["high_m"], below["volume_m3"]]
+    assert values(first, "expandedMU/si:valueExpandedMU") == [below["stated_U_m3"]]
+    assert values(first, "expandedMU/si:coverageFactor") == [below["k"]]
+    dips = [between["low_m"], between["high_m"]]
+    assert values(second, "real/si:value") == [
+        *dips, between["volume_m3"], between["stated_U_m3"]
+    ]  # fmt: skip
+    assert second.find(".//si:expandedMU", NAMES) is None

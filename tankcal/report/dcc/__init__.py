@@ -19,6 +19,7 @@ from tankcal.report.dcc.elements import (
     DEGREE,
     DENSITY,
     KILOGRAM,
+    LEAST_K,
     METRE,
     ONE,
     PER_KELVIN,
@@ -35,7 +36,7 @@ from tankcal.report.dcc.elements import (
     serialize,
 )
 from tankcal.report.tables import overrulings
-from tankcal.report.uncertainty.stated import k_of_rows, stated_U_m3
+from tankcal.report.uncertainty.stated import k_of_rows, limit_rows, stated_U_m3
 from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import language_of, load_words
 
@@ -44,7 +45,7 @@ FILE = "certificate.xml"
 _GROUPS = (  # groups of words for a record without survey, warning or decision
     *("language", "dcc", "certificate", "titles", "headings", "labels", "captions", "texts"),
     *("choices", "inputs", "kinds", "sides", "zeros", "parts", "units", "yes_no"),
-    *("rule_codes", "rule_texts", "formulas", "datum"),
+    *("rule_codes", "rule_texts", "formulas", "datum", "tank_limits"),
 )
 _UNITS = {  # {printed unit: unit of the value}; values are in SI, angles in degrees
     "m": METRE,
@@ -179,9 +180,13 @@ def _condition(parent, languages, key, value, unit):
 
 
 def _results(parent, languages):
-    """Add the table, the courses, the parts of the tank, and deadwood."""
+    """Add the table, the operating levels, the courses, the parts of the tank, and deadwood."""
     _capacity(_result(parent, "capacity", languages.word("headings.capacity")), languages)
     record = languages.record
+    if limits := limit_rows(record):
+        of = _result(parent, "limits", languages.word("headings.limits_of_tank"))
+        for limit in limits:
+            _limit(of, languages, limit)
     if record["courses"]:
         of = _result(parent, "courses", languages.word("headings.courses"))
         for course in record["courses"]:
@@ -239,6 +244,26 @@ def _table_description(paper, capacity):
     """Return sentences on the zero of the heights and on interpolation between rows."""
     zero = f"{paper.label('zero')}: {paper.word('zeros.' + capacity['zero'])}"
     return " ".join([f"{zero}.", *paper.choices("interpolation")])
+
+
+def _limit(parent, languages, limit):
+    """Add an operating level, or two, with the volume below or between them and its U."""
+    element = add_child(parent, "list", refType="tankcal_limit")
+    add_text(element, "name", languages.word(f"tank_limits.{limit['tank_limit']}"))
+    low = limit["low_m"]
+    dip, volume = ("dip", "volume") if low is None else ("dip_high", "volume_between")
+    add_real(element, "lowDip", low, METRE, languages.word("dcc.dip_low"))
+    add_real(element, "dip", limit["high_m"], METRE, languages.word(f"dcc.{dip}"))
+    # The schema refuses k below 1; without k, the interval of Monte Carlo has no multiple of u.
+    k, U = limit["k"], limit["U_m3"]
+    probability = languages.job["table"]["coverage_probability"]
+    has_k = U > 0 and k is not None and k >= LEAST_K
+    add_real(
+        element, "volume", limit["volume_m3"], CUBIC_METRE, languages.word(f"dcc.{volume}"),
+        kind="basic_measuredValue", expanded=(U, k, probability) if has_k else None,
+    )  # fmt: skip
+    if U > 0 and not has_k:
+        add_real(element, "expandedUncertainty", U, CUBIC_METRE, languages.word("dcc.U"))
 
 
 def _course(parent, languages, course):
