@@ -277,8 +277,44 @@ def test_folder_with_other_files_is_left_alone(tank, tmp_path, capsys):
     ticket = ["ticket", str(tank / "results"), str(tank / "ticket.toml"), "--out", str(folder)]
     assert main(ticket) == 2
     assert [path.name for path in folder.iterdir()] == ["letter.txt"]
-    assert main([*ticket, "--tickets", str(tank / "rows.csv")]) == 2
-    assert ".csv" in capsys.readouterr().err
+    assert "letter.txt" in capsys.readouterr().err
+
+
+def test_each_ticket_of_a_file_has_its_document(tank, tmp_path, capsys):
+    folder, rows = tmp_path / "out", tmp_path / "rows.csv"
+    ticket = ["ticket", str(tank / "results"), str(tank / "ticket.toml"), "--tickets", str(rows)]
+    rows.write_text("ticket,date,closing_dip_m\nA/1,2026-05-04,7.5\nB,,8.0\n", encoding="utf-8")
+    assert main([*ticket, "--out", str(tmp_path / "quantities.csv"), "--quiet"]) == 0
+    assert main([*ticket, "--out", str(folder), "--quiet"]) == 0
+    with (tmp_path / "quantities.csv").open(encoding="utf-8", newline="") as file:
+        expected = [float(row["moved_U_nsv_m3"]) for row in csv.DictReader(file)]
+    saved = [
+        json.loads((folder / name / "ticket.json").read_text("utf-8")) for name in ("A_1", "B")
+    ]
+    heads = [
+        (single["number"], single["date"], single["gaugings"][1]["level_m"]) for single in saved
+    ]
+    assert heads == [("A/1", "2026-05-04", 7.5), ("B", "2026-05-03", 8.0)]
+    U = [row["U"] for one in saved for row in one["quantities"]
+         if (row["state"], row["quantity"]) == ("moved", "nsv_m3")]  # fmt: skip
+    assert expected == pytest.approx(U, rel=1e-9)
+    assert all(verify(file.parent, tank / "results").problems == [] for file in files)
+    capsys.readouterr()
+
+
+def test_folders_of_tickets_are_checked_before_the_first_document(tank, tmp_path, capsys):
+    folder, rows = tmp_path / "out", tmp_path / "rows.csv"
+    ticket = ["ticket", str(tank / "results"), str(tank / "ticket.toml"), "--tickets", str(rows)]
+    rows.write_text("ticket\nA/1\na 1\n", encoding="utf-8")
+    assert main([*ticket, "--out", str(folder)]) == 2
+    assert (
+        "rows.csv, row 3, ticket: the folder a_1 is that of ticket A/1" in capsys.readouterr().err
+    )
+    (folder / "B").mkdir(parents=True)
+    (folder / "B" / "letter.txt").write_text("mine", encoding="utf-8")
+    rows.write_text("ticket\nA\nB\n", encoding="utf-8")
+    assert main([*ticket, "--out", str(folder)]) == 2
+    assert [path.name for path in folder.rglob("*")] == ["B", "letter.txt"]
 
 
 def test_the_decision_of_a_comparison():

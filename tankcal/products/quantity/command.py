@@ -49,8 +49,9 @@ def add(commands):
     ticket.add_argument(
         "--out",
         metavar="DIR|FILE.csv",
-        help="folder for the document of a single ticket (ticket.json, PDF to sign, XML, workbook, "
-        "web page), all files or none; or a .csv file for every step of the tickets",
+        help="folder for the document of a ticket (ticket.json, PDF to sign, XML, workbook, web "
+        "page), all files or none; with --tickets a folder in it for each ticket; or a .csv file "
+        "for every step of the tickets",
     )
     add_language(ticket)
     ticket.add_argument("--quiet", action="store_true", help="no progress, only problems")
@@ -70,12 +71,15 @@ def _ticket(options):
         return _write_new(options, read_table(record_file(options.record)))
     is_folder = options.out is not None and Path(options.out).suffix.lower() != ".csv"
     if options.out is not None:  # before the calculation, which may take a while
-        _check_output(options, is_folder)
+        _check_output(Path(options.out), is_folder, options.tickets is None)
     table = read_table(record_file(options.record))
     tickets = read_tickets(table, options.ticket, options.tickets)
     show, written = Progress(options.quiet or options.machine), ()
-    if is_folder:
-        written = _write_document(tickets, options.out, show)
+    if is_folder and options.tickets is not None:
+        written = _write_documents(tickets, Path(options.out), show)
+    elif is_folder:
+        written = [path.name for path in _write_document(tickets, options.out, show.step)]
+        show.end()
     rows = rows_of(tickets)
     if options.out is not None and not is_folder:
         write_rows(Path(options.out), rows)
@@ -92,37 +96,68 @@ def _ticket(options):
         for line in _ticket_lines(tickets):
             say(line)
     if written:
-        print_paths(Path(options.out), [path.name for path in written])
+        print_paths(Path(options.out), written)
     elif options.out is not None:
         print(f"  {printable(options.out)}")
     return 0
 
 
-def _check_output(options, is_folder):
-    """Refuse an output that must not be replaced, and a folder for many tickets."""
-    if not is_folder:
-        from tankcal.products.quantity.results import check_output
-
-        check_output(Path(options.out))
-        return
-    if options.tickets is not None:
-        expected = message(
-            "ticket_out_many", "expected the name of a .csv file for the tickets of --tickets"
-        )
-        raise InputError(Problem("--out", expected))
+def _check_output(path, is_folder, is_single):
+    """Refuse an output that must not be replaced."""
+    from tankcal.products.quantity.results import check_output
     from tankcal.report.ticket import refuse_foreign
 
-    refuse_foreign(options.out)
+    if not is_folder:
+        check_output(path)
+    elif is_single:
+        refuse_foreign(path)
 
 
-def _write_document(tickets, folder, show):
+def _write_document(tickets, folder, progress=None):
     """Write the document of a single ticket and return its files."""
     from tankcal.products.quantity.saving import document_file
     from tankcal.report.ticket import write_ticket
 
-    written = write_ticket(document_file(tickets), folder, language_of_run(), show.step)
+    return write_ticket(document_file(tickets), folder, language_of_run(), progress)
+
+
+def _write_documents(tickets, folder, show):
+    """Write the document of each ticket of a CSV file, and return the names of their folders."""
+    from tankcal.products.quantity.saving import document_file
+    from tankcal.report.ticket import refuse_foreign
+    from tankcal.text.naming import file_name
+
+    names = [file_name(name, f"ticket_{row + 1}") for row, name in enumerate(tickets.names)]
+    _refuse_equal_folders(tickets, names)
+    for name in names:
+        refuse_foreign(folder / name)
+    singles = [tickets.single(row) for row in range(len(names))]
+    for single in singles:  # an error in any ticket is reported before the first document
+        document_file(single)
+    writing = message("ticket_documents", "documents of the tickets")
+    for row, (name, single) in enumerate(zip(names, singles, strict=True)):
+        show.part(writing, row, len(names))
+        _write_document(single, folder / name)
     show.end()
-    return written
+    return names
+
+
+def _refuse_equal_folders(tickets, names):
+    """Refuse numbers of tickets whose folders would have the same name."""
+    first_rows, problems = {}, []
+    for row, name in enumerate(names):
+        earlier = first_rows.setdefault(name.casefold(), row)
+        if earlier != row:
+            expected = message(
+                "ticket_equal_folders",
+                "the folder {name} is that of ticket {ticket}, too; expected numbers that differ "
+                "in letters or digits",
+                name=name, ticket=tickets.names[earlier],
+            )  # fmt: skip
+            columns = tickets.columns
+            problems.append(Problem(columns.file, expected, columns.rows[row], "ticket"))
+    if problems:
+        raise InputError(problems)
 
 
 def _write_new(options, table):

@@ -10,7 +10,7 @@ import numpy as np
 from tankcal.job.checking import missing_beside, refuse_repeated
 from tankcal.job.contract.keys import CSV
 from tankcal.job.contract.shorthand import choice, number, positive
-from tankcal.job.entries import read_columns
+from tankcal.job.entries import ColumnValues, read_columns
 from tankcal.job.fields import Field
 from tankcal.job.folder import read_csv
 from tankcal.job.tables import Log, read_bytes
@@ -104,6 +104,7 @@ _PRODUCT_KEYS = tuple(field.name for field in PRODUCT)
 _OF_PRODUCT = ("density_kg_m3", "density_temperature_c", "sw_percent")
 ROWS = (
     Field("ticket", "name", message("ticket_note_ticket", "number of the ticket"), required=True),
+    Field("date", "date", ""),
     *(
         Field(f"{state}_{field.name}", field.kind, "", low=field.low, high=field.high)
         for state in STATES
@@ -112,6 +113,13 @@ ROWS = (
     *(field for field in PRODUCT if field.name in _OF_PRODUCT),
     positive("compared_value", "", 1e9),
 )
+_KEY_OF_COLUMN = {
+    "ticket": ("ticket", "number"),
+    "date": ("ticket", "date"),
+    "compared_value": ("compared", "value"),
+    **{name: ("product", name) for name in _OF_PRODUCT},
+    **{f"{state}_{field.name}": (state, field.name) for state in STATES for field in GAUGING},
+}
 
 SETTINGS_NAME = message("ticket_settings", "settings of the ticket")  # in place of a file
 
@@ -141,6 +149,8 @@ class Tickets:
     warnings : tuple of Problem
     files : dict
         {name of an input file: its SHA-256}.
+    columns : ColumnValues or None
+        Columns of the CSV file of many tickets.
     """
 
     names: tuple[str, ...]
@@ -149,6 +159,7 @@ class Tickets:
     compared: tuple | None
     warnings: tuple = ()
     files: Mapping = field(default_factory=dict)
+    columns: ColumnValues | None = None
 
     @cached_property
     def quantities(self):
@@ -212,6 +223,23 @@ class Tickets:
         frame = pandas.DataFrame({"contribution": parts})
         frame["share"] = frame.contribution**2 / result.u[ticket, place] ** 2
         return frame.sort_values("share", ascending=False, kind="stable")
+
+    def single(self, ticket):
+        """One of many tickets by its index: `Tickets` of the settings with the values of its row.
+
+        The document of a ticket can so be computed again from its own inputs.
+        """
+        if self.columns is None:
+            return self
+        sections = {name: dict(content) for name, content in self.sections.items()}
+        for column, (section, key) in _KEY_OF_COLUMN.items():
+            value = self.columns.of(column)[ticket]
+            if value is not None:
+                sections[section][key] = value
+        correction = self.transfer.product.correction
+        factors = correction if isinstance(correction, FactorTable) else None
+        single = read_tickets(self.transfer.table, sections, factors=factors)
+        return replace(single, files=self.files)
 
     def write(self, folder, language=None):
         """Write the document of a single ticket; see `report.ticket.write_ticket`."""
@@ -300,7 +328,7 @@ def _read(table, settings, rows, factors):
     _refuse_negative(source, transfer)
     log.stop_if_problems()
     files = {path.name: digest_of(path) for path in paths}
-    return Tickets(names, sections, transfer, compared, tuple(log.warnings), files)
+    return Tickets(names, sections, transfer, compared, tuple(log.warnings), files, columns)
 
 
 def _read_rows(path, marks, settings_file, log):
