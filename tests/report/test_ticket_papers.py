@@ -288,12 +288,9 @@ def test_each_ticket_of_a_file_has_its_document(tank, tmp_path, capsys):
     assert main([*ticket, "--out", str(folder), "--quiet"]) == 0
     with (tmp_path / "quantities.csv").open(encoding="utf-8", newline="") as file:
         expected = [float(row["moved_U_nsv_m3"]) for row in csv.DictReader(file)]
-    saved = [
-        json.loads((folder / name / "ticket.json").read_text("utf-8")) for name in ("A_1", "B")
-    ]
-    heads = [
-        (single["number"], single["date"], single["gaugings"][1]["level_m"]) for single in saved
-    ]
+    files = [folder / name / "ticket.json" for name in ("A_1", "B")]
+    saved = [json.loads(file.read_text("utf-8")) for file in files]
+    heads = [(one["number"], one["date"], one["gaugings"][1]["level_m"]) for one in saved]
     assert heads == [("A/1", "2026-05-04", 7.5), ("B", "2026-05-03", 8.0)]
     U = [row["U"] for one in saved for row in one["quantities"]
          if (row["state"], row["quantity"]) == ("moved", "nsv_m3")]  # fmt: skip
