@@ -232,8 +232,9 @@ def _budget_lines(paper):
 
 
 def _ticket_lines(tickets):
-    """Yield the net standard volume of each of the first tickets."""
+    """Yield the net standard volume of the first tickets, and the tickets that do not agree."""
     from tankcal.products.quantity.chain import QUANTITIES
+    from tankcal.products.quantity.results import compare
     from tankcal.report.plain import words_with_part
     from tankcal.text.words import load_words
 
@@ -254,3 +255,16 @@ def _ticket_lines(tickets):
     if len(tickets.names) > SHOWN_TICKETS:
         yield message("ticket_more", "  ... and {count} more; --out FILE.csv writes all of them",
                       count=len(tickets.names) - SHOWN_TICKETS)  # fmt: skip
+    comparison = compare(tickets)
+    if comparison is None or comparison.e_n is None:
+        return
+    rows = (abs(comparison.e_n) > 1).nonzero()[0]
+    if len(rows):
+        more = ", ..." if len(rows) > SHOWN else ""
+        yield message(
+            "ticket_disagree",
+            "{count} of {total} tickets do not agree with the other party (|E_n| > 1): {names}",
+            count=len(rows),
+            total=len(tickets.names),
+            names=", ".join(tickets.names[row] for row in rows[:SHOWN]) + more,
+        )
