@@ -67,6 +67,18 @@ class QuantityOfTicket(Saved):
     U: Finite = key("expanded uncertainty")
 
 
+class RoomOfTicket(Saved):
+    """Volume between the closing gauging and an operating level."""
+
+    name: str = key('"room" (to the maximum), "above_minimum", "pumpable" (above the pump suction)')
+    level_m: Finite = key("dip of the operating level")
+    value: Finite = key("m3, observed, at the temperature of the shell; negative beyond the level")
+    u: Finite = key("standard uncertainty")
+    dof: float | None = key("effective degrees of freedom; null: infinite")
+    k: Finite = key("coverage factor")
+    U: Finite = key("expanded uncertainty")
+
+
 class ContributionToTicket(Saved):
     """Contribution of an input to u of a quantity; the squares add up to u squared."""
 
@@ -134,6 +146,9 @@ class TicketFile(Saved, kw_only=True):
     gaugings: list[GaugingOfTicket] = key("closing last")
     steps: list[StepOfTicket] = key("in the order of the calculation")
     quantities: list[QuantityOfTicket] = key("by state")
+    rooms: list[RoomOfTicket] | None = key(
+        "to the operating levels; left out if the job has none", default=None, optional=True
+    )
     budget: list[ContributionToTicket] = key("of every quantity, the largest first")
     uncertainties: list[UncertaintyOfTicket] = key("of the inputs in use")
     comparison: ComparisonOfTicket | None = key("null: none")

@@ -567,3 +567,59 @@ def test_tickets_of_rows_are_listed(settings, example_record, tmp_path, capsys):
     assert first.startswith("  T0: closing less opening, net standard volume")
     assert "3 more" in more
     assert last.startswith("23 of 23 tickets do not agree")  # with the value of the TOML file
+
+
+LEVELS = {"full_m": None, "maximum_m": 11.0, "minimum_m": 1.2, "pump_suction_m": 0.4}
+
+
+def test_rooms_have_the_u_of_the_closed_form(settings):
+    """A cylinder: the error of the bottom cancels, that of the scale acts on the difference."""
+    table = replace(_cylinder(), levels=LEVELS)
+    transfer = read_tickets(table, settings()).transfer
+    rooms, closing = transfer.rooms(), transfer.gaugings["closing"]
+    u, steps, a = transfer.u, transfer.steps["closing"], 1.116e-5
+    warming = float(steps.shell_c[0]) - 20.0
+    ctsh, by_shell = 1 + 2 * a * warming + (a * warming) ** 2, 2 * a * (1 + a * warming)
+    level = float(closing.level_m[0])
+    for place, (name, dip, sign) in enumerate(
+        (("room", 11.0, 1), ("above_minimum", 1.2, -1), ("pumpable", 0.4, -1))
+    ):
+        volume = sign * M3_PER_M * (dip - level)
+        parts = [
+            M3_PER_M * ctsh * u["u_dip_mm"] / 1000,
+            M3_PER_M * ctsh * level * u["u_tape_ppm"] / 1e6,
+            volume * ctsh * 3e-4,
+            ctsh * 1e-4 * np.sqrt(2 / 3),
+            volume * by_shell * 7 / 8 * u["u_temperature_k"],
+            volume * by_shell * 7 / 8 * u["u_thermometer_k"],
+            volume * by_shell / 8 * u["u_ambient_k"],
+            volume * 2 * warming * (1 + a * warming) * u["u_expansion_per_k"],
+        ]
+        assert list(transfer.room_levels)[place] == name
+        assert rooms.value[0, place] == pytest.approx(volume * ctsh, rel=1e-12)
+        assert rooms.u[0, place] == pytest.approx(np.sqrt(np.sum(np.square(parts))), rel=1e-9)
+
+
+def test_rooms_of_a_tank_with_a_floating_roof(settings):
+    """The roof cancels where it floats at both dips; no level in its critical zone has a room."""
+    table = replace(_cylinder(with_roof=True), levels=LEVELS)
+    transfer = read_tickets(table, settings()).transfer
+    steps, rooms = transfer.steps["closing"], transfer.rooms()
+    assert list(transfer.room_levels) == ["room", "pumpable"]  # 1.2 m is in the critical zone
+    level = float(transfer.gaugings["closing"].level_m[0])
+    room, pumpable = rooms.value[0]
+    ctsh = float(steps.ctsh[0])
+    assert room == pytest.approx(M3_PER_M * (11.0 - level) * ctsh, rel=1e-12)
+    expected = M3_PER_M * (level - 0.4) * ctsh + float(steps.fra_m3[0])
+    assert pumpable == pytest.approx(expected, rel=1e-12)
+    density = np.abs(rooms.contributions["density"][0])
+    assert density[0] < 1e-12 < density[1]
+
+
+def test_rooms_are_columns_only_with_levels(settings):
+    without, with_levels = _cylinder(), replace(_cylinder(), levels=LEVELS | {"minimum_m": None})
+    assert "closing_room_m3" not in rows_of(read_tickets(without, settings()))[0]
+    (row,) = rows_of(read_tickets(with_levels, settings()))
+    names = [name for name in row if "room" in name or "pumpable" in name]
+    assert names == [f"closing_{part}_m3" for part in ("room", "U_room", "pumpable", "U_pumpable")]
+    assert row["closing_U_room_m3"] > 0

@@ -1,8 +1,10 @@
 """What `tankcal ticket --out FOLDER` writes: a page to sign, XML, workbook, page; verification."""
 
 import csv
+import io
 import json
 import shutil
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -342,3 +344,21 @@ def test_a_stock_has_no_column_of_an_opening(tmp_path):
     assert words["table_headings"]["closing"] in text
     saved = json.loads((tmp_path / "out" / "ticket.json").read_text(encoding="utf-8"))
     assert {row["state"] for row in saved["quantities"]} == {"closing"}
+
+
+def test_rooms_are_on_the_page_and_in_the_xml(tmp_path):
+    table = replace(_cylinder(), levels={"maximum_m": 11.0, "pump_suction_m": 0.5})
+    tickets = read_tickets(table, LONG)
+    write_ticket(document_file(tickets), tmp_path / "out", "pt-BR")
+    content = (tmp_path / "out" / "ticket.xml").read_bytes()
+    assert list(schema().iter_errors(io.BytesIO(content))) == []
+    result = ElementTree.fromstring(content).find(
+        f".//{{{DCC}}}result[@refType='tankcal_roomResult']"
+    )
+    values = [float(found.text) for found in result.findall(f".//{{{SI}}}real/{{{SI}}}value")]
+    expanded = [float(found.text) for found in result.findall(f".//{{{SI}}}valueExpandedMU")]
+    rooms = tickets.transfer.rooms()
+    assert (values, expanded) == (rooms.value[0].tolist(), rooms.U[0].tolist())
+    reader = pypdf.PdfReader(tmp_path / "out" / "ticket.pdf")
+    assert len(reader.pages) == 1
+    assert "Espaço disponível" in reader.pages[0].extract_text()

@@ -168,6 +168,30 @@ def _shell_factor(table, level_m, shell_c, expansion_per_k):
     return np.where(is_empty, 1.0, ratio)
 
 
+def fill_to(table, level_m, steps, expansion_per_k):
+    """Observed volume of liquid and water up to a dip, in the state of a gauging.
+
+    Parameters
+    ----------
+    table : TankTable
+    level_m : float
+        Dip for use.
+    steps : Steps
+        Steps of the gauging: temperature of the shell and correction of the roof.
+    expansion_per_k : ndarray, shape (n,)
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        m3.
+    """
+    level = np.full(np.shape(steps.tov_m3), level_m)
+    ctsh = _shell_factor(table, level, steps.shell_c, expansion_per_k)
+    # Below its critical zone the roof rests on its legs, and displaces no liquid.
+    fra = np.where(table.is_critical(level), 0.0, steps.fra_m3)
+    return table.volume(level) * ctsh + fra
+
+
 def values_of(steps):
     """{name: real values (n,)} of the steps."""
     return {field.name: np.real(getattr(steps, field.name)) for field in fields(steps)}

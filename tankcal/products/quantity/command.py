@@ -177,7 +177,7 @@ def _tell(tickets):
     from tankcal.products.quantity.saving import ticket_file
     from tankcal.record.schema import to_plain
     from tankcal.report.ticket import TicketPaper
-    from tankcal.report.ticket.pages import comparison_text
+    from tankcal.report.ticket.pages import comparison_text, room_texts
     from tankcal.report.ticket.tables import step_text
 
     paper = TicketPaper(to_plain(ticket_file(tickets)), language_of_run())
@@ -190,6 +190,8 @@ def _tell(tickets):
         print(" ", step_text(paper, row, states))
     for row in saved["quantities"]:
         say(_quantity_line(paper, row))
+    for key, text in room_texts(paper):
+        print(printable(f"{paper.label(key)}: {text}"))
     for line in _budget_lines(paper):
         say(line)
     if saved["comparison"] is not None:

@@ -64,6 +64,11 @@ def rows_of(tickets):
             columns[f"{state}_{name}"] = result.value[:, place].tolist()
             columns[f"{state}_u_{name}"] = result.u[:, place].tolist()
             columns[f"{state}_U_{name}"] = result.U[:, place].tolist()
+    if tickets.transfer.room_levels:
+        rooms = tickets.transfer.rooms()
+        for place, name in enumerate(tickets.transfer.room_levels):
+            columns[f"closing_{name}_m3"] = rooms.value[:, place].tolist()
+            columns[f"closing_U_{name}_m3"] = rooms.U[:, place].tolist()
     comparison = compare(tickets)
     if comparison is not None:
         columns[f"difference_{comparison.quantity}"] = _numbers(comparison.difference)

@@ -17,6 +17,7 @@ from tankcal.record.ticket import (
     FactorsOfTicket,
     GaugingOfTicket,
     QuantityOfTicket,
+    RoomOfTicket,
     StepOfTicket,
     TableOfTicket,
     TicketFile,
@@ -73,6 +74,7 @@ def ticket_file(tickets):
         gaugings=[_gauging(sections, transfer, state) for state in transfer.gaugings],
         steps=_steps(transfer.steps),
         quantities=_quantities(quantities),
+        rooms=_rooms(transfer),
         budget=_budget(quantities),
         uncertainties=_uncertainties(sections["uncertainty"], quantities),
         comparison=_comparison(tickets),
@@ -157,6 +159,19 @@ def _quantities(quantities):
         )
         for state, result in quantities.items()
         for at, name in enumerate(QUANTITIES)
+    ]  # fmt: skip
+
+
+def _rooms(transfer):
+    if not transfer.room_levels:
+        return None
+    result = transfer.rooms()
+    return [
+        RoomOfTicket(
+            name, dip, *map(float, (result.value[0, at], result.u[0, at])),
+            _number(result.dof[0, at]), *map(float, (result.k[0, at], result.U[0, at])),
+        )
+        for at, (name, dip) in enumerate(transfer.room_levels.items())
     ]  # fmt: skip
 
 

@@ -52,6 +52,8 @@ class TankTable:
         Section [certificate] of the job.
     date : str
         Date of the calibration, ISO.
+    levels : dict
+        Section [levels] of the job: {"maximum_m": dip or None ...}.
     """
 
     tank: str
@@ -70,6 +72,7 @@ class TankTable:
     is_roof_in_table: bool = True
     certificate: Mapping = field(default_factory=dict)
     date: str = ""
+    levels: Mapping = field(default_factory=dict)
 
     def volume(self, level_m):
         """Volume at each dip, m3, linear between two rows; (n,) real or complex dips."""
@@ -98,6 +101,13 @@ class TankTable:
         if self.roof is None:
             return np.zeros(np.shape(level_m), dtype=bool)
         return level_m < self.roof.critical_top_m
+
+    def is_for_use(self, level_m):
+        """Whether a dip is in the table and outside the critical zone of the roof."""
+        if self.is_outside(level_m):
+            return False
+        roof = self.roof
+        return roof is None or not roof.critical_bottom_m < level_m < roof.critical_top_m
 
     def roof_correction_m3(self, observed_kg_m3):
         """Correction FRA of a volume of the table for the roof, m3, at (n,) observed densities."""
@@ -191,6 +201,7 @@ def read_table(path):
         digest=digest_of(path),
         certificate=job["certificate"],
         date=job["survey"]["date"],
+        levels=job.get("levels") or {},
     )
 
 

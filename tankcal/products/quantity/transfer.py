@@ -11,12 +11,25 @@ from functools import cached_property
 import numpy as np
 
 from tankcal.gum.coverage import coverage_factor, dof_of
-from tankcal.products.quantity.chain import QUANTITIES, Gauging, Product, Steps, follow_chain
+from tankcal.products.quantity.chain import (
+    QUANTITIES,
+    Gauging,
+    Product,
+    Steps,
+    fill_to,
+    follow_chain,
+)
 from tankcal.products.quantity.table import TankTable
 from tankcal.tank.gauging import assumed_u_vcf
 
 STEP = 1e-30  # of complex steps; far below rounding, so that derivatives are exact
 STATES = ("opening", "closing")
+# Volumes between the closing gauging and an operating level: key of the level, sign.
+ROOMS = {
+    "room": ("maximum_m", 1),  # can still be received
+    "above_minimum": ("minimum_m", -1),
+    "pumpable": ("pump_suction_m", -1),  # can be delivered
+}
 
 
 @dataclass(frozen=True)
@@ -87,6 +100,54 @@ class Transfer:
             )
             for state in results
         }
+
+    @cached_property
+    def room_levels(self):
+        """{name of ROOMS: dip} of the operating levels of the tank that are for use."""
+        dips = {name: self.table.levels.get(key) for name, (key, _) in ROOMS.items()}
+        return {
+            name: dip
+            for name, dip in dips.items()
+            if dip is not None and self.table.is_for_use(dip)
+        }
+
+    def rooms(self):
+        """`Quantities` (n, rooms) of the closing gauging, in the order of `room_levels`.
+
+        They are observed volumes at the temperature of the shell, with water. Errors of the table
+        that both dips share cancel, and so do those of a floating roof.
+        """
+        dips = self.room_levels
+        slopes, contributions = {}, {}
+        for name, u in self._standard_uncertainties():
+            slopes[name] = self._rooms({name: STEP * 1j}, np.imag) / STEP
+            contributions[name] = slopes[name] * np.reshape(u, (-1, 1))
+        closing = self.steps["closing"]
+        count = len(closing.tov_m3)
+        # An error of the table at an operating level acts like one at the dip, with other sign.
+        at_level = -slopes["interpolation closing"]
+        contributions["interpolation level"] = at_level * self.table.interpolation_m3 / np.sqrt(3)
+        level = self.gaugings["closing"].level_m
+        parts = [(slopes["interpolation closing"], self.table.factor(level))]
+        dof = self.table.dof_at(level)
+        for place, dip in enumerate(dips.values()):
+            is_place = np.arange(len(dips)) == place
+            at_dip = np.full(count, dip)
+            parts.append((np.where(is_place, at_level, 0.0), self.table.factor(at_dip)))
+            dof = np.minimum(dof, self.table.dof_at(at_dip))
+        value = self._rooms({}, np.real)
+        return _combine(value, contributions, _table_variance(parts), dof, self.probability)
+
+    def _rooms(self, errors, part):
+        """Real or imaginary parts (n, rooms) of the volumes of `rooms` with errors."""
+        steps = self._evaluate(errors)["closing"]
+        expansion = self.product.expansion_per_k + errors.get("expansion", 0.0)
+        present = steps.tov_m3 * steps.ctsh + steps.fra_m3
+        columns = [
+            ROOMS[name][1] * (fill_to(self.table, dip, steps, expansion) - present)
+            for name, dip in self.room_levels.items()
+        ]
+        return part(np.column_stack(columns))
 
     def _evaluate(self, errors):
         """{state: Steps} with the errors {name: complex number} of the inputs."""

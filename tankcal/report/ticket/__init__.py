@@ -123,6 +123,7 @@ def _sheets(book):
         label_text,
         notes,
         result_text,
+        room_texts,
         warnings_text,
     )
     from tankcal.report.workbook.sections import FIRST_LINE, Sentences, SheetContent, cell_table
@@ -131,7 +132,8 @@ def _sheets(book):
     result = ": ".join([label_text(paper), result_text(paper)])
     texts = filter(None, [warnings_text(paper), *notes(paper)])
     compared = filter(None, [comparison_text(paper)])
-    head = Sentences([result], look=FIRST_LINE), Sentences([*compared])
+    rooms = [f"{paper.label(key)}: {text}" for key, text in room_texts(paper)]
+    head = Sentences([result], look=FIRST_LINE), Sentences([*compared, *rooms])
     sections = [head, cell_table(book, STEPS), Sentences([*texts])]
     yield SheetContent("steps", sections, tab="result")
     yield SheetContent("quantities", [cell_table(book, QUANTITIES)], tab="result")

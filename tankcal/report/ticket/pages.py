@@ -41,7 +41,7 @@ def pages(paper, folder=None, whole=False):
         blocks.side_by_side(_show_facts(paper, _head(paper))),
         blocks.result(label_text(paper), result_text(paper), comparison_text(paper)),
         paper.show(RESULTS, result_rows(paper)),
-        paper.facts(_gaugings(paper)),
+        paper.facts([*_gaugings(paper), *room_texts(paper)]),
         blocks.side_by_side(paper.facts(_properties(paper))),
         steps if whole else blocks.whole(steps),
         paper.show(
@@ -129,6 +129,22 @@ def comparison_text(paper):
 def _gaugings(paper):
     """Return the readings of the gaugings."""
     return [(f"gauging_{row['state']}", _gauging(paper, row)) for row in paper.record["gaugings"]]
+
+
+def room_texts(paper):
+    """Return (key of the label, text) of the volumes to the operating levels."""
+    texts = []
+    for row in paper.record.get("rooms") or ():
+        written = format_with_u(row["value"], row["U"], paper.marks)
+        text = paper.word(
+            "texts.room",
+            value=written.value,
+            U=written.uncertainty,
+            k=fixed(row["k"], 2, paper.marks),
+            level=paper.height(row["level_m"]),
+        )
+        texts.append((f"ticket_{row['name']}", text))
+    return texts
 
 
 def _properties(paper):

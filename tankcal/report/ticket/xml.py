@@ -122,6 +122,16 @@ def _results(parent, languages, saved):
         _gauging(results, languages, saved, gauging)
     for state in dict.fromkeys(row["state"] for row in saved["quantities"]):
         _quantities(results, languages, saved, state)
+    if rooms := saved.get("rooms"):
+        result = add_child(results, "result", refType="tankcal_roomResult")
+        add_text(result, "name", languages.label("ticket_rooms"))
+        data = add_child(result, "data")
+        for row in rooms:
+            add_real(
+                data, row["name"], row["value"], CUBIC_METRE,
+                languages.label(f"ticket_{row['name']}"), kind="basic_measuredValue",
+                expanded=(row["U"], row["k"], saved["probability"]),
+            )  # fmt: skip
 
 
 def _gauging(parent, languages, saved, gauging):
