@@ -362,3 +362,14 @@ def test_rooms_are_on_the_page_and_in_the_xml(tmp_path):
     reader = pypdf.PdfReader(tmp_path / "out" / "ticket.pdf")
     assert len(reader.pages) == 1
     assert "Espaço disponível" in reader.pages[0].extract_text()
+
+
+def test_a_document_is_of_a_single_ticket(tmp_path):
+    rows = tmp_path / "rows.csv"
+    rows.write_text("ticket;sw_percent\nA;0,1\nB;0,2\n", encoding="utf-8")
+    tickets = read_tickets(_cylinder(), LONG, rows)
+    with pytest.raises(ValueError, match="found 2 tickets; expected a single ticket"):
+        tickets.write(tmp_path / "out")
+    tickets.single(1).write(tmp_path / "out")
+    saved = json.loads((tmp_path / "out" / "ticket.json").read_text(encoding="utf-8"))
+    assert (saved["number"], saved["sw_percent"]) == ("B", 0.2)

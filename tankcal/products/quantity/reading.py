@@ -242,7 +242,16 @@ class Tickets:
         return replace(single, files=self.files)
 
     def write(self, folder, language=None):
-        """Write the document of a single ticket; see `report.ticket.write_ticket`."""
+        """Write the document of a single ticket; see `report.ticket.write_ticket`.
+
+        Raises
+        ------
+        ValueError
+            For several tickets; `single` selects a ticket.
+        """
+        if len(self.names) > 1:
+            raise ValueError(f"found {len(self.names)} tickets; expected a single ticket, such as "
+                             "tickets.single(0)")  # fmt: skip
         from tankcal.products.quantity.saving import document_file
         from tankcal.report.ticket import write_ticket
 
