@@ -304,7 +304,7 @@ def test_nobody_decides_where_nobody_listens(widgets, english):
 def test_the_whole_view(widgets, result, record, heard):
     view = results_view(result, record, "pt-BR", lambda *given: heard.append(given))
     _, tabs = view.children
-    assert list(tabs.titles) == ["Tabela", "Parede e pontos", "Balanço de incerteza"]
+    assert list(tabs.titles) == ["Tabela", "Quantidade", "Parede e pontos", "Balanço de incerteza"]
 
 
 def test_picture_and_list_look_at_the_same_point(widgets, result, english):
@@ -334,6 +334,120 @@ def test_sliders_of_the_budget(widgets, result, paper):
         panel.low.value = wrong
         assert panel.totals.value != of_delivery
         assert panel.table.value == ""
+
+
+# ---- quantity calculator
+
+TICKET = {
+    "product": {
+        "correction": "D1250-04", "group": "products", "base": "20C", "density_kg_m3": 835.2,
+        "density_is": "observed", "density_temperature_c": 27.5, "hydrometer": "glass 20C",
+        "sw_percent": 0.05,
+    },
+    "opening": {"dip_m": 2.317, "water_dip_m": 0.612, "temperature_c": 28.4, "ambient_c": 25.0},
+    "closing": {"dip_m": 8.642, "water_dip_m": 0.612, "temperature_c": 31.2, "ambient_c": 29.0},
+    "uncertainty": {"u_expansion_per_k": 2e-6},
+}  # fmt: skip
+
+
+@pytest.fixture
+def quantity(widgets, paper):
+    """Quantity panel in which the ticket was typed with the decimal mark of the language."""
+    from tankcal.products.workbench.views.quantity import QuantityPanel
+
+    panel = QuantityPanel(paper)
+    for section, values in TICKET.items():
+        for key, value in values.items():
+            typed = (
+                value if isinstance(value, str) else str(value).replace(".", paper.marks.decimal)
+            )
+            panel.entries[f"{section}.{key}"].value = typed
+    return panel
+
+
+def printed(answer):
+    """Text of the cells of the HTML of an answer."""
+    return [unescape(re.sub("<[^>]+>", "", cell)) for cell in re.findall(r"<td.*?</td>", answer)]
+
+
+def test_a_typed_ticket_is_that_of_the_result(result, paper, quantity):
+    from tankcal.text.digits import format_with_u
+
+    transfer = result.ticket(TICKET)
+    cells = printed(quantity.answer.value)
+    for state in ("opening", "closing", "moved"):
+        for name in ("gov_m3", "gsv_m3", "nsv_m3", "mass_kg"):
+            row = transfer.frame().loc[("1", state, name)]
+            written = format_with_u(row.value, row.U, paper.marks)
+            assert {written.value, written.uncertainty} <= set(cells)
+    assert quantity.settings() == (TICKET, {})
+    assert not any(remark.value for remark in quantity.remarks.values())
+
+
+def test_a_stock_needs_no_opening(result, paper, quantity):
+    from tankcal.text.digits import format_with_u
+
+    for key in TICKET["opening"]:
+        quantity.entries[f"opening.{key}"].value = " "
+    stock = result.ticket({name: part for name, part in TICKET.items() if name != "opening"})
+    row = stock.frame().loc[("1", "closing", "mass_kg")]
+    written = format_with_u(row.value, row.U, paper.marks)
+    assert {written.value, written.uncertainty} <= set(printed(quantity.answer.value))
+    assert paper.words["ticket"]["states"]["moved"] not in quantity.answer.value
+
+
+@pytest.mark.parametrize(
+    ("place", "typed"),
+    [
+        ("closing.dip_m", "99"), ("closing.ullage_m", "2.5"), ("closing.water_dip_m", "9"),
+        ("opening.temperature_c", "190"), ("product.density_kg_m3", "0.84"),
+        ("product.sw_percent", "50"), ("product.density_temperature_c", ""),
+        ("product.density_is", "base"), ("product.alpha_per_k", "8e-4"), ("opening.dip_m", ""),
+        ("uncertainty.u_dip_mm", "-1"),
+    ],
+)  # fmt: skip
+def test_a_problem_is_told_beside_its_field(result, paper, quantity, place, typed):
+    from tankcal.text.words import say
+
+    quantity.entries[place].value = typed
+    assert quantity.answer.value == ""
+    with pytest.raises(InputError) as refused:
+        result.ticket(quantity.settings()[0])
+    for problem in refused.value.problems:
+        text = say(paper.words, problem.expected)
+        assert text in unescape(quantity.remarks[problem.column].value)
+
+
+def test_a_missing_choice_is_asked_for_in_words(paper, quantity):
+    quantity.entries["product.group"].value = None
+    asked = paper.words["quantity"]["sentences"]["group_blank"]
+    assert asked in unescape(quantity.remarks["product.group"].value)
+    assert quantity.answer.value == ""
+
+
+@pytest.mark.parametrize("typed", ["<b>8</b>", "1.2.3", "8 m", "1.234,5", "nan", "9" * 400])
+def test_an_entry_that_is_no_number_is_refused(quantity, typed):
+    quantity.entries["closing.dip_m"].value = typed
+    assert quantity.answer.value == ""
+    assert quantity.remarks["closing.dip_m"].value
+    assert "<b>" not in quantity.remarks["closing.dip_m"].value
+
+
+def test_a_slip_is_told_beside_its_field(paper, quantity):
+    quantity.entries["product.sw_percent"].value = "0.0005"
+    assert "0" + paper.marks.decimal + "005" in quantity.remarks["product.sw_percent"].value
+    assert quantity.answer.value
+
+
+def test_a_form_without_entries_is_silent(widgets, paper):
+    from tankcal.products.workbench.views.quantity import QuantityPanel
+
+    panel = QuantityPanel(paper)
+    panel.entries["closing.dip_m"].value = "4"
+    assert panel.remarks["product.correction"].value
+    panel.entries["closing.dip_m"].value = ""
+    assert not any(remark.value for remark in panel.remarks.values())
+    assert panel.answer.value == panel.state.value == ""
 
 
 def test_without_anywidget_a_page_is_still_framed(monkeypatch, widgets, english):

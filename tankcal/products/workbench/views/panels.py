@@ -1,4 +1,4 @@
-"""Widgets of a result: table and calculators, wall with rejected points, budget."""
+"""Widgets of a result: table and calculators, quantity, wall with rejected points, budget."""
 
 from html import escape
 from importlib.util import find_spec
@@ -10,6 +10,7 @@ from tankcal.errors import InputError, TankcalError
 from tankcal.job.contract.overrulings import DECISIONS
 from tankcal.products.workbench.views.calculator import Calculator
 from tankcal.products.workbench.views.page import frame_html, table_page, wall_page
+from tankcal.products.workbench.views.quantity import QuantityPanel
 from tankcal.products.workbench.views.what_if import BudgetPanel
 from tankcal.report.web.wall_map import list_inspected, reason_text
 from tankcal.text.words import say
@@ -23,6 +24,7 @@ def live_view(result, paper, on_overrule):
     """Widget with all parts of the view as tabs."""
     word = paper.word
     parts = {"views.table": table_part(result, paper)}
+    parts["views.quantity"] = QuantityPanel(paper).box
     wall = wall_page(paper)
     if wall is not None or paper.record["rejected"]:
         parts["views.wall"] = wall_part(result, paper, wall, on_overrule)
