@@ -1,4 +1,4 @@
-"""Point clouds in the papers: facts, tables, and a map of the unrolled wall."""
+"""Point clouds in the documents: facts, tables, and a map of the unrolled wall."""
 
 from math import ceil
 

@@ -4,7 +4,7 @@ from tankcal.report import numbers
 from tankcal.report.tables.table import Column
 
 HIDDEN_U = 2.0  # change of a volume by an undetected error, in U, above which page 1 reports it
-# Unit of a control in the record and unit in the papers.
+# Unit of a control in the record and unit in the documents.
 SHOWN = {"1": "share ppm", "m3/h": "L/h", "m3": "L"}
 
 

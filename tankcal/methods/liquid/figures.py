@@ -1,4 +1,4 @@
-"""Calibration by metered liquid in the papers: facts, tables of steps, misclosures, figures."""
+"""Calibration by metered liquid in the documents: facts, tables of steps, misclosures, figures."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from tankcal.methods.liquid.facts import control_text, density_text, with_u
 from tankcal.pipeline.plots.style import FAINT, GREY, INK, RED, WIDTH, Drawing, set_margins, styled
 from tankcal.report import numbers
 
-MOST_ROWS = 16  # rows of the table of volumes in the papers; the workbook has all rows
+MOST_ROWS = 16  # rows of the table of volumes in the documents; the workbook has all rows
 MARKERS = "osD^vP*X"  # marker of each run, as matplotlib names it
 BEYOND = 4.0  # largest half-height of the frame, in largest |difference| + U without geometry
 COLOURS = {"geometry": FAINT, "liquid": RED, "joint": INK}
