@@ -396,6 +396,20 @@ def test_a_stock_needs_no_opening(result, paper, quantity):
     assert paper.words["ticket"]["states"]["moved"] not in quantity.answer.value
 
 
+def test_a_typed_zero_is_an_entry(result, paper, quantity):
+    """A blank takes the assumption or the default; 0 does not."""
+    from tankcal.text.digits import format_with_u
+
+    changed = {**TICKET, "uncertainty": TICKET["uncertainty"] | {"u_density_kg_m3": 0.0}}
+    changed["opening"] = TICKET["opening"] | {"water_dip_m": 0.0}
+    quantity.entries["uncertainty.u_density_kg_m3"].value = "0"
+    quantity.entries["opening.water_dip_m"].value = f"0{paper.marks.decimal}0"
+    assert quantity.settings() == (changed, {})
+    row = result.ticket(changed).frame().loc[("1", "moved", "mass_kg")]
+    written = format_with_u(row.value, row.U, paper.marks)
+    assert {written.value, written.uncertainty} <= set(printed(quantity.answer.value))
+
+
 @pytest.mark.parametrize(
     ("place", "typed"),
     [

@@ -137,7 +137,7 @@ class QuantityPanel:
                     wrong[place] = value.strip()
                     continue
                 value = float(plain) if plain else None
-            if value not in (None, False):
+            if value is not None and value is not False:  # 0 is an entry, and equals False
                 settings.setdefault(section, {})[key] = value
         return settings, wrong
 
