@@ -306,9 +306,8 @@ def test_folders_of_tickets_are_checked_before_the_first_document(tank, tmp_path
     ticket = ["ticket", str(tank / "results"), str(tank / "ticket.toml"), "--tickets", str(rows)]
     rows.write_text("ticket\nA/1\na 1\n", encoding="utf-8")
     assert main([*ticket, "--out", str(folder)]) == 2
-    assert (
-        "rows.csv, row 3, ticket: the folder a_1 is that of ticket A/1" in capsys.readouterr().err
-    )
+    expected = "rows.csv, row 3, ticket: the folder a_1 is also that of ticket A/1"
+    assert expected in capsys.readouterr().err
     (folder / "B").mkdir(parents=True)
     (folder / "B" / "letter.txt").write_text("mine", encoding="utf-8")
     rows.write_text("ticket\nA\nB\n", encoding="utf-8")

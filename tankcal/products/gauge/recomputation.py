@@ -52,7 +52,8 @@ def compute_again(saved, folder):
         notes.append(
             message(
                 "verify_gauge_inputs",
-                "the input files are not in {folder}: readings and settings were taken from {file}",
+                "{folder} does not contain the input files with the SHA-256 stated in {file}; "
+                "readings and settings were taken from {file}",
                 folder=str(folder),
                 file=GAUGE.file,
             )

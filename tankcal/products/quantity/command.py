@@ -78,8 +78,7 @@ def _ticket(options):
     if is_folder and options.tickets is not None:
         written = _write_documents(tickets, Path(options.out), show)
     elif is_folder:
-        written = [path.name for path in _write_document(tickets, options.out, show.step)]
-        show.end()
+        written = _write_document(tickets, options.out, show)
     rows = rows_of(tickets)
     if options.out is not None and not is_folder:
         write_rows(Path(options.out), rows)
@@ -113,31 +112,32 @@ def _check_output(path, is_folder, is_single):
         refuse_foreign(path)
 
 
-def _write_document(tickets, folder, progress=None):
-    """Write the document of a single ticket and return its files."""
+def _write_document(tickets, folder, show):
+    """Write the document of a single ticket and return the names of its files."""
     from tankcal.products.quantity.saving import document_file
     from tankcal.report.ticket import write_ticket
 
-    return write_ticket(document_file(tickets), folder, language_of_run(), progress)
+    written = write_ticket(document_file(tickets), folder, language_of_run(), show.step)
+    show.end()
+    return [path.name for path in written]
 
 
 def _write_documents(tickets, folder, show):
     """Write the document of each ticket of a CSV file, and return the names of their folders."""
     from tankcal.products.quantity.saving import document_file
-    from tankcal.report.ticket import refuse_foreign
+    from tankcal.report.ticket import refuse_foreign, write_ticket
     from tankcal.text.naming import file_name
 
     names = [file_name(name, f"ticket_{row + 1}") for row, name in enumerate(tickets.names)]
     _refuse_equal_folders(tickets, names)
     for name in names:
         refuse_foreign(folder / name)
-    singles = [tickets.single(row) for row in range(len(names))]
-    for single in singles:  # an error in any ticket is reported before the first document
-        document_file(single)
-    writing = message("ticket_documents", "documents of the tickets")
-    for row, (name, single) in enumerate(zip(names, singles, strict=True)):
+    # An error in any ticket is reported before the first document.
+    contents = [document_file(tickets.single(row)) for row in range(len(names))]
+    writing = message("ticket_documents", "writing the documents of the tickets")
+    for row, (name, content) in enumerate(zip(names, contents, strict=True)):
         show.part(writing, row, len(names))
-        _write_document(single, folder / name)
+        write_ticket(content, folder / name, language_of_run())
     show.end()
     return names
 
@@ -150,7 +150,7 @@ def _refuse_equal_folders(tickets, names):
         if earlier != row:
             expected = message(
                 "ticket_equal_folders",
-                "the folder {name} is that of ticket {ticket}, too; expected numbers that differ "
+                "the folder {name} is also that of ticket {ticket}; expected numbers that differ "
                 "in letters or digits",
                 name=name, ticket=tickets.names[earlier],
             )  # fmt: skip

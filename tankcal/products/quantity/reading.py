@@ -120,6 +120,7 @@ _KEY_OF_COLUMN = {
     **{name: ("product", name) for name in _OF_PRODUCT},
     **{f"{state}_{field.name}": (state, field.name) for state in STATES for field in GAUGING},
 }
+_COLUMN_OF_KEY = {".".join(place): column for column, place in _KEY_OF_COLUMN.items()}
 
 SETTINGS_NAME = message("ticket_settings", "settings of the ticket")  # in place of a file
 
@@ -225,7 +226,7 @@ class Tickets:
         return frame.sort_values("share", ascending=False, kind="stable")
 
     def single(self, ticket):
-        """One of many tickets by its index: `Tickets` of the settings with the values of its row.
+        """A single ticket by its index: `Tickets` of the settings with the values of its row.
 
         The document of a ticket can so be computed again from its own inputs.
         """
@@ -368,8 +369,7 @@ class _Source:
 
     def column(self, key):
         """Name of the column of "section.key", or None if the CSV file does not have it."""
-        section, _, name = key.partition(".")
-        column = f"{section}_{name}" if section in STATES else name
+        column = _COLUMN_OF_KEY.get(key)
         is_there = self.columns is not None and self.columns.columns.get(column) is not None
         return column if is_there else None
 
@@ -702,16 +702,12 @@ def _refuse_negative(source, transfer):
 def _compared(source):
     """(quantity, values (n,), U or None, source) of the other party, or None."""
     given = source.sections["compared"]
-    column = None if source.columns is None else source.columns.columns.get("compared_value")
+    column = source.column("compared.value")
     if column is None and all(given[field.name] is None for field in COMPARISON):
         return None
     if given["quantity"] is None:
-        other = "compared.value" if column is None else "compared_value"
-        source.tell("compared.quantity", missing_beside(other))
+        source.tell("compared.quantity", missing_beside(column or "compared.value"))
     if given["value"] is None and column is None:
         source.tell("compared.value", missing_beside("compared.quantity"))
-    values = np.full(source.count, np.nan if given["value"] is None else given["value"])
-    if column is not None:  # a blank cell has the value of the TOML file, as in other columns
-        in_rows = source.columns.numbers("compared_value")
-        values = np.where(np.isnan(in_rows), values, in_rows)
+    values = source.numbers("compared.value")
     return given["quantity"], values, given["U"], given["source"] or ""
