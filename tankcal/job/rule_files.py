@@ -31,20 +31,20 @@ from tankcal.tank.rules.model import (
 )
 from tankcal.text.shipped import shipped_folder
 
-# Keys of the file of a decision rule: [rule], and [PART.NAME] for the parts of LIMITS.
-
-RULE = (
+# Keys that all rule files share: [rule], and the source of each limit.
+HEAD = (
     Field("name", "text", "name of the rule", required=True),
     Field("source", "text", "where its values were read", required=True),
     Field("verified", "flag", "whether they were read in the legal or technical text itself"),
     Field("remark", "text", "anything that is to stand beside it"),
-    positive("largest_capacity_m3", "largest tank it is for", 1e9),
 )
-_SHARED = (
-    Field("tanks", "names", "kinds of tank that it is for"),
+SOURCE = (
     Field("clause", "text", "where it stands in the text"),
     Field("verified", "flag", "whether it was read in the legal or technical text itself"),
 )
+# Keys of the file of a decision rule: [rule], and [PART.NAME] for the parts of LIMITS.
+RULE = (*HEAD, positive("largest_capacity_m3", "largest tank it is for", 1e9))
+_SHARED = (Field("tanks", "names", "kinds of tank that it is for"), *SOURCE)
 _PERCENT = positive("limit_percent", "limit in percent", 100)
 LIMITS = {
     "uncertainty": (
@@ -78,19 +78,89 @@ _ENDING = ".toml"
 
 
 @dataclass(frozen=True)
-class ShippedRules:
-    """Rules of one kind: shipped with tankcal, or in files of a laboratory.
+class RuleFiles:
+    """Rule files of one kind: shipped with tankcal, or written by a laboratory.
 
     Attributes
     ----------
     folder : str
         Folder of the shipped rules within the package.
-    parse : callable
-        parse(file, data, log) returns a rule, or None with problems in `log`.
+    head : tuple of Field
+        Keys of [rule].
+    sections : dict
+        {section: fields} of the limits.
+    make : callable
+        make(head, limits, file) returns the rule; `limits` has (section, name, {key: value}) of
+        each section in the order of the file.
+    example : str
+        A section, for the message about a file without limits.
+    has_names : bool
+        Whether the sections are [SECTION.NAME], so that one kind of limit may occur repeatedly.
+    check : callable, optional
+        check(file, part, section, values, given, row, log) reports contradictions in a section.
     """
 
     folder: str
-    parse: Callable
+    head: tuple
+    sections: dict
+    make: Callable
+    example: str
+    has_names: bool = False
+    check: Callable | None = None
+
+    def parse(self, file, data, log):
+        """Rule in the bytes of a TOML file; None, with every problem in `log`, if invalid."""
+        problems_before = len(log.problems)
+        settings, rows = read_toml(file, data, log)
+        if settings is None:
+            return None
+        head = read_section(
+            file, "rule", self.head, settings.pop("rule", {}), rows.get("rule"), log
+        )
+        limits = []
+        for section, given in settings.items():
+            part, _, name = section.partition(".") if self.has_names else (section, "", section)
+            row = rows.get(section)
+            if part not in self.sections or "." in name:
+                log.problem(file, self._expect_sections(part), row, f"[{section}]")
+            elif name:
+                values = read_section(file, section, self.sections[part], given, row, log)
+                if self.check:
+                    self.check(file, part, section, values, given, row, log)
+                limits.append((part, name, values))
+            elif given:
+                expected = message(
+                    "in_no_limit",
+                    "is in no limit; expected in one, such as [{part}.volumes]",
+                    part=part,
+                )
+                log.problem(file, expected, row, f"[{section}]")
+        if len(log.problems) == problems_before and not limits:
+            expected = message(
+                "no_limits",
+                "no limits; expected sections such as [{section}]",
+                section=self.example,
+            )
+            log.problem(file, expected)
+        if len(log.problems) > problems_before:
+            return None
+        # A limit without `verified` or `clause` takes `verified` of the whole rule, and no clause.
+        for _, _, values in limits:
+            if values["verified"] is None:
+                values["verified"] = bool(head["verified"])
+            values["clause"] = values["clause"] or ""
+        head["remark"] = head["remark"] or ""
+        return self.make(head, limits, file)
+
+    def _expect_sections(self, part):
+        """Message that lists the sections beside an unknown one."""
+        ending = ".NAME" if self.has_names else ""
+        return message(
+            "unknown_section_of_rule",
+            "unknown section; expected [rule] or one of {sections}{hint}",
+            sections=[f"[{known}{ending}]" for known in self.sections],
+            hint=nearest(part, (*self.sections, "rule")),
+        )
 
     def names(self):
         """Names of the shipped rules."""
@@ -188,45 +258,6 @@ def _tell_unknown(file, row, column, name, no_file, rules, log):
     log.problem(file, expected, row, column)
 
 
-def parse_rule(file, data, log):
-    """Rule in the content of a TOML file; None, with every problem in `log`, if invalid."""
-    problems_before = len(log.problems)
-    settings, sections = read_toml(file, data, log)
-    if settings is None:
-        return None
-    given = settings.pop("rule", {})
-    head = read_section(file, "rule", RULE, given, sections.get("rule"), log)
-    limits = {part: [] for part in LIMITS}
-    for section, given in settings.items():
-        part, _, name = section.partition(".")
-        row = sections.get(section)
-        if part not in LIMITS or "." in name:
-            hint = nearest(part, (*LIMITS, "rule"))
-            expected = message(
-                "unknown_section_of_rule",
-                "unknown section; expected [rule] or one of {sections}{hint}",
-                sections=[f"[{known}.NAME]" for known in LIMITS],
-                hint=hint,
-            )
-            log.problem(file, expected, row, f"[{section}]")
-        elif name:
-            values = read_section(file, section, LIMITS[part], given, row, log)
-            _tell_contradictions(file, part, section, values, given, row, log)
-            limits[part].append((name, values))
-        elif given:
-            expected = message(
-                "in_no_limit",
-                "is in no limit; expected in one, such as [{part}.volumes]",
-                part=part,
-            )
-            log.problem(file, expected, row, f"[{section}]")
-    if len(log.problems) == problems_before and not any(limits.values()):
-        log.problem(
-            file, message("no_limits", "no limits; expected sections such as [uncertainty.volumes]")
-        )
-    return _rule(head, limits) if len(log.problems) == problems_before else None
-
-
 def _tell_contradictions(file, part, section, values, given, row, log):
     """Report keys that contradict each other or are missing, and unknown kinds of tank."""
 
@@ -288,60 +319,48 @@ def _tell_heights(values, is_given, tell):
             )
 
 
-def _rule(head, limits):
-    rule_verified = bool(head["verified"])
-    uncertainty = tuple(
-        UncertaintyLimit(
-            of=values["of"],
-            limit=_part(values["limit_percent"]),
-            relative_to=values["relative_to"] or "itself",
-            minimum_height_m=values["minimum_height_m"],
-            **_shared(name, values, rule_verified),
-        )
-        for name, values in limits["uncertainty"]
-    )
-    deviation = tuple(
-        DeviationLimit(
-            of=values["of"],
-            limit=_part(values["limit_percent"]),
-            limit_m3=values["limit_m3"],
-            side=values["side"] or "both",
-            guard=values["guard"],
-            **_shared(name, values, rule_verified),
-        )
-        for name, values in limits["deviation"]
-    )
-    heights = tuple(
-        ReferenceHeightLimit(
-            limit_m=values["limit_mm"] / 1000, **_shared(name, values, rule_verified)
-        )
-        for name, values in limits["reference_height"]
-    )
-    periods = tuple(
-        Period(of=values["of"], years=values["years"], **_shared(name, values, rule_verified))
-        for name, values in limits["period"]
-    )
+def _make_rule(head, limits, file):
+    """Rule of a file; percentages become fractions, millimetres metres."""
+    by_part = {part: [] for part in LIMITS}
+    for part, name, values in limits:
+        shared = {key: values[key] for key in ("clause", "verified")}
+        by_part[part].append((values, {"name": name, "tanks": values["tanks"] or ()} | shared))
     return Rule(
         name=head["name"],
         source=head["source"],
-        verified=all(limit.verified for limit in (*uncertainty, *deviation, *heights, *periods)),
-        remark=head["remark"] or "",
+        verified=all(values["verified"] for _, _, values in limits),
+        remark=head["remark"],
         largest_capacity_m3=head["largest_capacity_m3"],
-        uncertainty=uncertainty,
-        deviation=deviation,
-        reference_height=heights,
-        periods=periods,
+        uncertainty=tuple(
+            UncertaintyLimit(
+                of=values["of"],
+                limit=_part(values["limit_percent"]),
+                relative_to=values["relative_to"] or "itself",
+                minimum_height_m=values["minimum_height_m"],
+                **shared,
+            )
+            for values, shared in by_part["uncertainty"]
+        ),
+        deviation=tuple(
+            DeviationLimit(
+                of=values["of"],
+                limit=_part(values["limit_percent"]),
+                limit_m3=values["limit_m3"],
+                side=values["side"] or "both",
+                guard=values["guard"],
+                **shared,
+            )
+            for values, shared in by_part["deviation"]
+        ),
+        reference_height=tuple(
+            ReferenceHeightLimit(limit_m=values["limit_mm"] / 1000, **shared)
+            for values, shared in by_part["reference_height"]
+        ),
+        periods=tuple(
+            Period(of=values["of"], years=values["years"], **shared)
+            for values, shared in by_part["period"]
+        ),
     )
-
-
-def _shared(name, values, rule_verified):
-    verified = values["verified"]
-    return {
-        "name": name,
-        "tanks": values["tanks"] or (),
-        "clause": values["clause"] or "",
-        "verified": rule_verified if verified is None else verified,
-    }
 
 
 def _part(percent):
@@ -349,5 +368,14 @@ def _part(percent):
     return None if percent is None else percent / 100
 
 
-_SHIPPED = ShippedRules("job/rule_tables", parse_rule)
-shipped_names, shipped_rule, named_rule = _SHIPPED.names, _SHIPPED.rule, _SHIPPED.named
+_FILES = RuleFiles(
+    "job/rule_tables",
+    RULE,
+    LIMITS,
+    _make_rule,
+    "uncertainty.volumes",
+    has_names=True,
+    check=_tell_contradictions,
+)
+parse_rule = _FILES.parse
+shipped_names, shipped_rule, named_rule = _FILES.names, _FILES.rule, _FILES.named

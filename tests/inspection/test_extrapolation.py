@@ -6,6 +6,7 @@ from levelled_tanks import LIMITS, epoch_of, even_azimuths
 from numpy.testing import assert_allclose
 from settled_tanks import CLASSES, FAMILIES, levelled_class, shares
 
+from tankcal.gum.conformity import severity, verdict_of
 from tankcal.products.inspection.out_of_plane import (
     Statistic,
     estimate_statistic,
@@ -15,7 +16,6 @@ from tankcal.products.inspection.out_of_plane import (
 )
 from tankcal.products.inspection.rules import Strength
 from tankcal.products.inspection.settlement import assess, settlement_figures
-from tankcal.products.inspection.verdict import severity, verdict_of
 
 N = 16
 T = even_azimuths(N)

@@ -9,12 +9,13 @@ import pytest
 from scipy import stats
 
 from tankcal.errors import HeightError
+from tankcal.gum.conformity import conformity_probability
 from tankcal.job.rule_files import shipped_names, shipped_rule
 from tankcal.record.schema import to_plain
 from tankcal.record.table import rule_of
 from tankcal.tank.capacity import Capacity
 from tankcal.tank.deliveries import worst_deliveries
-from tankcal.tank.rules import TANKS, PrintedU, StatedVolume, conformity_probability, judge
+from tankcal.tank.rules import TANKS, PrintedU, StatedVolume, judge
 from tankcal.tank.rules.model import DeviationLimit, UncertaintyLimit
 from tankcal.tank.rules.verdict import judge_deviation, judge_uncertainty
 from tankcal.uncertainty import Source
@@ -33,14 +34,19 @@ def table(datum=0.0, scale=0.0, dof=np.inf, critical=None, volume=None):
     return Capacity(HEIGHTS, volume, np.full(101, 100.0), sources, 0.95, critical)
 
 
+SHARED = {"name": "one", "tanks": (), "clause": "", "verified": True}
+
+
 def uncertainty(of="volumes", percent=0.2, relative_to="itself", minimum=None):
     limit = None if percent is None else percent / 100
-    return UncertaintyLimit("one", (), of, limit, relative_to, minimum, "", True)
+    return UncertaintyLimit(
+        of=of, limit=limit, relative_to=relative_to, minimum_height_m=minimum, **SHARED
+    )
 
 
 def deviation(of="volumes", percent=0.3, limit_m3=None, side="both", guard="none"):
     limit = None if limit_m3 is not None else percent / 100
-    return DeviationLimit("one", (), of, limit, limit_m3, side, guard, "", True)
+    return DeviationLimit(of=of, limit=limit, limit_m3=limit_m3, side=side, guard=guard, **SHARED)
 
 
 # --- the expanded uncertainty

@@ -7,6 +7,7 @@ import numpy as np
 from tankcal.adjust import CRITICAL
 from tankcal.errors import Problem
 from tankcal.gum.components import Source
+from tankcal.gum.conformity import probability_of, verdict_of
 from tankcal.messages import message
 from tankcal.products.exports.exporting import gauge_correction, shortening_m
 from tankcal.products.gauge import saved
@@ -24,7 +25,6 @@ from tankcal.products.gauge.reading import (
     TAPE,
     shell_of,
 )
-from tankcal.products.inspection.verdict import probability_of, verdict_of
 from tankcal.products.settings import drop_blanks, fill_blanks
 from tankcal.record.texts import warnings_of
 

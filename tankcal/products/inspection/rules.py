@@ -9,19 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tankcal.gum.conformity import RuleSet
 from tankcal.job.contract.shorthand import number, positive
-from tankcal.job.entries import read_section
 from tankcal.job.fields import Field
-from tankcal.job.folder import read_toml
-from tankcal.job.rule_files import ShippedRules
-from tankcal.job.tables import nearest
-from tankcal.messages import message
+from tankcal.job.rule_files import HEAD, SOURCE, RuleFiles
 from tankcal.record.inspection import InspectionLimit
 
-SOURCE = (
-    Field("clause", "text", "where it stands in the text"),
-    Field("verified", "flag", "whether it was read in the text itself"),
-)
 SETTLEMENT = (
     positive("curvature_factor", "c of the largest curvature c Y / (E H)", 1e3, required=True),
     number("least_r2", "least share of the scatter that the plane explains", 0, 1),
@@ -232,12 +225,6 @@ def _drops_of_curve(rows, width_m):
 
 
 DEFAULT = "api_653"  # rule of an inspection that names no rule
-HEAD = (
-    Field("name", "text", "name of the rule", required=True),
-    Field("source", "text", "where its values were read", required=True),
-    Field("verified", "flag", "whether they were read in the text itself"),
-    Field("remark", "text", "anything that is to stand beside it"),
-)
 _OF_HEIGHT = positive("part_of_height", "limit as a part of the height", 1, required=True)
 _MOST = positive("most_mm", "largest size, mm", 1e4, required=True)
 SECTIONS = {
@@ -258,86 +245,38 @@ SECTIONS = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Rule:
+@dataclass(frozen=True, kw_only=True)
+class Rule(RuleSet):
     """Limits of an inspection, as read from a rule file.
 
     Attributes
     ----------
-    name, source, remark : str
-        Name of the rule, source of its values, and a remark, "" if none.
     file : str
         Name of the rule file.
     sections : dict
         Limits, {section: {key: value or None}}. Each section has a value of `verified`.
+    name, source, verified, remark
+        As for a RuleSet.
     """
 
-    name: str
-    source: str
-    remark: str
     file: str
     sections: dict
 
-    @property
-    def verified(self):
-        """Whether all values were read in the text of the standard itself."""
-        return all(section["verified"] for section in self.sections.values())
+
+def _make_rule(head, limits, file):
+    """`Rule` of the sections of a file."""
+    return Rule(
+        name=head["name"],
+        source=head["source"],
+        verified=all(values["verified"] for _, _, values in limits),
+        remark=head["remark"],
+        file=file,
+        sections={section: values for section, _, values in limits},
+    )
 
 
-def parse_rule(file, data, log):
-    """Parse the `Rule` in the bytes of a TOML file.
-
-    Parameters
-    ----------
-    file : str
-        Name of the file, for messages.
-    data : bytes
-        Content of the file.
-    log : Log
-        Receives the problems of the file.
-
-    Returns
-    -------
-    Rule or None
-        None if the file has problems.
-    """
-    problem_count = len(log.problems)
-    settings, rows = read_toml(file, data, log)
-    if settings is None:
-        return None
-    given = settings.pop("rule", {})
-    head = read_section(file, "rule", HEAD, given, rows.get("rule"), log)
-    sections = {}
-    for section, values in settings.items():
-        if section in SECTIONS:
-            sections[section] = read_section(
-                file, section, SECTIONS[section], values, rows.get(section), log
-            )
-            continue
-        expected = message(
-            "unknown_section_of_inspection",
-            "unknown section; expected [rule] or one of {sections}{hint}",
-            sections=[f"[{name}]" for name in SECTIONS],
-            hint=nearest(section, (*SECTIONS, "rule")),
-        )
-        log.problem(file, expected, rows.get(section), f"[{section}]")
-    if len(log.problems) == problem_count and not sections:
-        expected = message(
-            "no_limits_of_inspection", "no limits; expected sections such as [roundness]"
-        )
-        log.problem(file, expected)
-    if len(log.problems) > problem_count:
-        return None
-    # A section without `verified` or `clause` takes `verified` of the whole rule, and no clause.
-    for values in sections.values():
-        if values["verified"] is None:
-            values["verified"] = bool(head["verified"])
-        values["clause"] = values["clause"] or ""
-    return Rule(head["name"], head["source"], head["remark"] or "", file, sections)
-
-
-_SHIPPED = ShippedRules("products/inspection/rules", parse_rule)
-shipped_names, shipped_rule = _SHIPPED.names, _SHIPPED.rule
+_FILES = RuleFiles("products/inspection/rules", HEAD, SECTIONS, _make_rule, "roundness")
+parse_rule, shipped_names, shipped_rule = _FILES.parse, _FILES.names, _FILES.rule
 
 
 def find_rule(name, log):
@@ -346,7 +285,7 @@ def find_rule(name, log):
     The name is such as "api_653" or "rules/house.toml". If the rule is missing or invalid, `log`
     receives the problems, and None is returned.
     """
-    rules = _SHIPPED.named(name, log)
+    rules = _FILES.named(name, log)
     return None if rules is None else rules[0]
 
 

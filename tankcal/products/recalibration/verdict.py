@@ -88,15 +88,10 @@ def judge_limits(rule, tank, former, new, basis, new_U):
     numbers = [
         _deviation(limit, basis, new_U)
         for limit in rule.deviation
-        if applies_to(limit, tank) and basis.usable.any()
+        if limit.applies_to(tank) and basis.usable.any()
     ]
-    heights = [limit for limit in rule.reference_height if applies_to(limit, tank)]
+    heights = [limit for limit in rule.reference_height if limit.applies_to(tank)]
     return [*numbers, *(_reference_height(height, former, new) for height in heights)]
-
-
-def applies_to(limit, tank):
-    """Whether a limit applies to a kind of tank."""
-    return not limit.tanks or tank in limit.tanks
 
 
 def _deviation(limit, basis, new_U):
@@ -199,7 +194,7 @@ def judge_ages(rule, tank, former, new):
             verified=period.verified,
         )
         for period in rule.periods
-        if applies_to(period, tank)
+        if period.applies_to(tank)
     ]
 
 
@@ -218,7 +213,7 @@ def _years_between(before, after):
 
 def find_zero_limit(rule, tank):
     """Largest undeclared zero, m, by the rule or by default."""
-    return min((limit.limit_m for limit in rule.reference_height if applies_to(limit, tank)),
+    return min((limit.limit_m for limit in rule.reference_height if limit.applies_to(tank)),
                default=USUAL_LIMIT_M)  # fmt: skip
 
 

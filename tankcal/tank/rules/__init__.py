@@ -6,7 +6,6 @@ from tankcal.tank.rules.verdict import (
     RuleVerdict,
     StatedVolume,
     UncertaintyVerdict,
-    conformity_probability,
     deliveries_to_check,
     judge,
 )
@@ -21,7 +20,6 @@ __all__ = [
     "StatedVolume",
     "UncertaintyLimit",
     "UncertaintyVerdict",
-    "conformity_probability",
     "deliveries_to_check",
     "judge",
 ]

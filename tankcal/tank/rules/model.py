@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tankcal.gum.conformity import Limit, RuleSet
+
 TANKS = (
     "vertical_fixed_roof",
     "vertical_floating_roof",
@@ -23,16 +25,23 @@ GUARDS = ("none", "U")
 PERIOD_OF = ("all", "bottom_course")
 
 
-@dataclass(frozen=True)
-class UncertaintyLimit:
+@dataclass(frozen=True, kw_only=True)
+class TankLimit(Limit):
+    """Limit for some kinds of tank; (): for all."""
+
+    tanks: tuple[str, ...]
+
+    def applies_to(self, tank):
+        """Whether the limit applies to a kind of tank."""
+        return not self.tanks or tank in self.tanks
+
+
+@dataclass(frozen=True, kw_only=True)
+class UncertaintyLimit(TankLimit):
     """Limit of the expanded uncertainty U.
 
     Attributes
     ----------
-    name : str
-        Name in the file.
-    tanks : tuple of str
-        Kinds of tank to which it applies; (): all.
     of : str
         "volumes": every row; "capacity": the highest row; "deliveries": all deliveries of at least
         minimum_height_m.
@@ -42,24 +51,18 @@ class UncertaintyLimit:
         "itself": the row, the capacity, the delivered volume; "capacity".
     minimum_height_m : float or None
         Least height of a delivery; None for other limits.
-    clause : str
-        Reference in the legal text.
-    verified : bool
-        Whether the value was read in the legal text itself.
+    name, tanks, clause, verified
+        As for a TankLimit.
     """
 
-    name: str
-    tanks: tuple[str, ...]
     of: str
     limit: float | None
     relative_to: str
     minimum_height_m: float | None
-    clause: str
-    verified: bool
 
 
-@dataclass(frozen=True)
-class DeviationLimit:
+@dataclass(frozen=True, kw_only=True)
+class DeviationLimit(TankLimit):
     """Limit of the deviation of a volume from a stated volume.
 
     Attributes
@@ -75,40 +78,32 @@ class DeviationLimit:
     guard : str
         "none": accepted up to the limit; "U": up to the limit less U (JCGM 106:2012 8.3.2).
     name, tanks, clause, verified
-        As for an UncertaintyLimit.
+        As for a TankLimit.
     """
 
-    name: str
-    tanks: tuple[str, ...]
     of: str
     limit: float | None
     limit_m3: float | None
     side: str
     guard: str
-    clause: str
-    verified: bool
 
 
-@dataclass(frozen=True)
-class ReferenceHeightLimit:
+@dataclass(frozen=True, kw_only=True)
+class ReferenceHeightLimit(TankLimit):
     """Limit of the change of the reference height since the previous calibration.
 
     Attributes
     ----------
     limit_m : float
     name, tanks, clause, verified
-        As for an UncertaintyLimit.
+        As for a TankLimit.
     """
 
-    name: str
-    tanks: tuple[str, ...]
     limit_m: float
-    clause: str
-    verified: bool
 
 
-@dataclass(frozen=True)
-class Period:
+@dataclass(frozen=True, kw_only=True)
+class Period(TankLimit):
     """Period of validity of a table.
 
     Attributes
@@ -117,42 +112,29 @@ class Period:
         "all": the whole tank; "bottom_course": its lowest course.
     years : float
     name, tanks, clause, verified
-        As for an UncertaintyLimit.
+        As for a TankLimit.
     """
 
-    name: str
-    tanks: tuple[str, ...]
     of: str
     years: float
-    clause: str
-    verified: bool
 
 
-@dataclass(frozen=True)
-class Rule:
+@dataclass(frozen=True, kw_only=True)
+class Rule(RuleSet):
     """Decision rule of a jurisdiction.
 
     Attributes
     ----------
-    name : str
-    source : str
-        Source of the values.
-    verified : bool
-        Whether all values were read in the legal text itself.
-    remark : str
-        Remark to be printed with the rule; "": none.
     largest_capacity_m3 : float or None
         Largest capacity to which the rule applies; None: no limit.
     uncertainty, deviation
         Limits of a table.
     reference_height, periods
         Additional limits of a new table relative to the previous table.
+    name, source, verified, remark
+        As for a RuleSet.
     """
 
-    name: str
-    source: str
-    verified: bool
-    remark: str
     largest_capacity_m3: float | None
     uncertainty: tuple[UncertaintyLimit, ...]
     deviation: tuple[DeviationLimit, ...]

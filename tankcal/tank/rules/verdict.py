@@ -13,21 +13,17 @@ and the errors of the two dips do not cancel according to the law of propagation
 Agreement with a stated volume
 ------------------------------
 
-The tolerance interval about the stated volume is [T_L, T_U]. The acceptance interval is [T_L + w,
-T_U - w] with w = U, or w = 0 (simple acceptance). With F the standard normal distribution, or
-Student's t for finite degrees of freedom,
-p_c = F((T_U - y)/u) - F((T_L - y)/u); a missing limit is at infinity. Source: JCGM 106:2012 7.3,
-7.4 (probability), 8.2 (simple acceptance), 8.3.2 (guarded acceptance); t for few degrees of
-freedom: JCGM 101:2008 6.4.9.
+The tolerance interval about the stated volume is [T_L, T_U], and the guard band is U or 0; see
+`tankcal.gum.conformity`.
 """
 
 import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import ndtr, stdtr
 
 from tankcal.errors import HeightError
+from tankcal.gum.conformity import conformity_probability, decide
 from tankcal.messages import message
 from tankcal.tank.deliveries import (
     Delivery,
@@ -41,6 +37,13 @@ from tankcal.tank.rules.model import TANKS, DeviationLimit, Rule, UncertaintyLim
 AT_TOP_M = 1e-3  # a dip within a millimetre of the last row counts as the top
 _ROUNDING = 1e-12  # relative tolerance: U equal to the limit meets it
 _SAME_M = 1e-6  # heights of deliveries with a smaller difference are equal
+# Codes of a legal limit: beyond it a value fails, whether or not U reaches back to it.
+_CODES = {
+    "passed": "conforms",
+    "guard_band": "guard_band",
+    "guard_band_beyond": "fails",
+    "failed": "fails",
+}
 TO_LOWEST = 12  # number of simulated deliveries to the lowest dip for a limit
 
 
@@ -107,40 +110,6 @@ class DeviationVerdict:
     probability: float
 
 
-def conformity_probability(value, u, lower, upper, dof=np.inf):
-    """Return p_c = F((upper - value)/u) - F((lower - value)/u), vectorised.
-
-    Parameters
-    ----------
-    value, u : array_like
-        Estimate and standard uncertainty; u = 0: 1 inside the limits, else 0.
-    lower, upper : array_like
-        Limits; -inf or inf for a missing limit.
-    dof : array_like, optional
-        Degrees of freedom of u: Student's t; inf: normal.
-
-    Returns
-    -------
-    ndarray
-    """
-    value, u, lower, upper, dof = np.broadcast_arrays(value, u, lower, upper, dof)
-    exact = u == 0
-    scale = np.where(exact, 1.0, u)
-    # Use the smaller tail, so that small probabilities have full relative accuracy.
-    above, below = (upper - value) / scale, (lower - value) / scale
-    flip = above + below > 0
-    above, below = np.where(flip, -below, above), np.where(flip, -above, below)
-    inside = (value >= lower) & (value <= upper)
-    return np.where(exact, inside.astype(float), _cdf(above, dof) - _cdf(below, dof))
-
-
-def _cdf(z, dof):
-    """Return the distribution function of Student's t; for dof = inf, of the normal."""
-    finite = np.where(np.isfinite(dof), dof, 1.0)
-    bounded = np.clip(z, -1e300, 1e300)
-    return np.where(np.isfinite(dof), stdtr(finite, bounded), ndtr(z))
-
-
 def judge_deviation(limit, table, stated, printed=None):
     """Return the DeviationVerdict of a limit, a Capacity and a StatedVolume, or None.
 
@@ -195,7 +164,8 @@ def judge_volume(limit, stated, quantity, U):
     lower = -math.inf if limit.side == "upper" else stated.volume_m3 - tolerance
     upper = math.inf if limit.side == "lower" else stated.volume_m3 + tolerance
     guard = U if limit.guard == "U" else 0.0
-    code = _deviation_code(quantity, lower, upper, guard)
+    decision = decide(quantity.value_m3, lower, upper, guard)
+    code = _CODES[decision] if quantity.for_use else "not_for_use"
     return DeviationVerdict(
         limit=limit,
         stated=stated,
@@ -212,15 +182,6 @@ def judge_volume(limit, stated, quantity, U):
         guard_m3=guard,
         probability=float(conformity_probability(quantity.value_m3, u, lower, upper, quantity.dof)),
     )
-
-
-def _deviation_code(quantity, lower, upper, guard):
-    """Return the code of a verdict."""
-    if not quantity.for_use:
-        return "not_for_use"
-    if lower + guard <= quantity.value_m3 <= upper - guard:
-        return "conforms"
-    return "guard_band" if lower <= quantity.value_m3 <= upper else "fails"
 
 
 @dataclass(frozen=True)
@@ -510,8 +471,8 @@ def judge(rule, table, tank, lowest_m=None, stated=(), printed=None):
     rows = np.flatnonzero(table.for_use(table.height_m))
     capacity = float(table.volume_m3[rows[-1]]) if len(rows) else np.nan
     is_too_large = rule.largest_capacity_m3 is not None and capacity > rule.largest_capacity_m3
-    limits = [] if is_too_large else [item for item in rule.uncertainty if _applies_to(item, tank)]
-    others = [] if is_too_large else [item for item in rule.deviation if _applies_to(item, tank)]
+    limits = [] if is_too_large else [item for item in rule.uncertainty if item.applies_to(tank)]
+    others = [] if is_too_large else [item for item in rule.deviation if item.applies_to(tank)]
     uncertainty = tuple(judge_uncertainty(item, table, lowest_m, printed) for item in limits)
     pairs = [judge_deviation(limit, table, item, printed) for limit in others for item in stated]
     deviation = tuple(verdict for verdict in pairs if verdict is not None)
@@ -550,15 +511,10 @@ def deliveries_to_check(rule, table, tank):
     limits = [
         candidate
         for candidate in rule.uncertainty
-        if candidate.of == "deliveries" and _applies_to(candidate, tank)
+        if candidate.of == "deliveries" and candidate.applies_to(tank)
     ]
     pairs = [pair for limit in limits for pair in deliveries_to_judge(limit, table)]
     return tuple(dict.fromkeys(pairs))
-
-
-def _applies_to(limit, tank):
-    """Whether a limit applies to a kind of tank."""
-    return not limit.tanks or tank in limit.tanks
 
 
 def _rule_code(verdicts, unjudged):
