@@ -10,7 +10,7 @@ from PIL import Image
 
 import tankcal
 from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations
-from tankcal.pipeline.plots.style import FAINT, INK, RED, STYLE, WIDTH, set_margins
+from tankcal.report.plots.style import FAINT, INK, RED, STYLE, WIDTH, set_margins
 
 ROOT = Path(__file__).resolve().parent.parent
 DPI, COLOURS, RADIUS_M = 130, 128, 7.5

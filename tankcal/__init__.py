@@ -23,11 +23,11 @@ if TYPE_CHECKING:  # what a type checker reads; nothing of it runs
     from tankcal.errors import HeightError, InputError, SolutionError, TankcalError
     from tankcal.job import Job, load
     from tankcal.pipeline.chain import adjust_job, run
-    from tankcal.pipeline.plots.views import plot
     from tankcal.pipeline.result import Result
     from tankcal.products.linter.linting import lint
     from tankcal.products.quantity.ticketing import ticket
     from tankcal.report.outputs import write
+    from tankcal.report.plots.views import plot
     from tankcal.survey import Adjustment
 
     __version__: str
@@ -39,7 +39,7 @@ _ROOM_OF = {
     "adjust_job": "pipeline.chain",
     "Result": "pipeline.result",
     "Adjustment": "survey",
-    "plot": "pipeline.plots.views",
+    "plot": "report.plots.views",
     "write": "report.outputs",
     "lint": "products.linter.linting",
     "ticket": "products.quantity.ticketing",

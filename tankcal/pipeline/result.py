@@ -202,9 +202,9 @@ class Result:
 
     def plot(self, what: str | None = None) -> "Figure":
         """Draw a figure of the result, chosen by the names that `tankcal.plot` accepts."""
-        from tankcal.pipeline.plots.views import plot
+        import tankcal  # the drawings belong to the reports, above this package
 
-        return plot(self, what)
+        return tankcal.plot(self, what)
 
     def budget(
         self,

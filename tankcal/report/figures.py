@@ -1,4 +1,4 @@
-"""Figures of the working papers, drawn by `tankcal.pipeline.plots.figures` from the record.
+"""Figures of the working papers, drawn by `tankcal.report.plots.figures` from the record.
 
 Each function takes a Paper and returns a matplotlib Figure, or a list of figures if there are many
 sections. The labels of the axes are in the language of the paper.
@@ -7,7 +7,7 @@ sections. The labels of the axes are in the language of the paper.
 import numpy as np
 from matplotlib.ticker import Formatter, ScalarFormatter
 
-from tankcal.pipeline.plots import figures as plots
+from tankcal.report.plots import figures as plots
 from tankcal.report.uncertainty.stated import stated_U_m3
 
 

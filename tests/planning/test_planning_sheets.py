@@ -9,7 +9,6 @@ import pytest
 from matplotlib.colors import to_hex
 from plan_folders import PLAN, changed_plan, with_setups
 
-from tankcal.pipeline.plots.style import INK, RED
 from tankcal.planning import load_plan, predict
 from tankcal.planning.improvements import what_helps
 from tankcal.planning.model import Pillar, Tie
@@ -19,6 +18,7 @@ from tankcal.report.planning.field_sheets import sheets
 from tankcal.report.planning.outlook import outlook
 from tankcal.report.planning.paper import PlanPaper
 from tankcal.report.planning.stands import stands
+from tankcal.report.plots.style import INK, RED
 
 OBSTACLE = (
     '[[obstacles]]\nname = "bund"\nkind = "box"\nfrom_m = [10.0, 24.0, 8.0]\n'

@@ -645,7 +645,7 @@ def test_marks_of_many_points_are_one_picture(only, monkeypatch):
     marks, pictures, words = counted()
     assert marks > 20
     assert pictures == 0
-    monkeypatch.setattr("tankcal.pipeline.plots.style.MANY", 2)
+    monkeypatch.setattr("tankcal.report.plots.style.MANY", 2)
     assert counted() == (0, len(figures.select_photos(paper)), words)
 
 

@@ -19,7 +19,6 @@ from uncertain_job import HOSTILE, as_before, write_uncertain_job
 import tankcal
 from tankcal.gum.distributions import NAMES
 from tankcal.job.contract.uncertainty import INPUTS
-from tankcal.pipeline.plots import style as plot_style
 from tankcal.record import record_of, save
 from tankcal.record.covariance_factor import blocks_of
 from tankcal.record.schema import to_plain
@@ -27,6 +26,7 @@ from tankcal.record.table import budgets_of
 from tankcal.report import figures
 from tankcal.report.paper import Paper
 from tankcal.report.pdf import pdf
+from tankcal.report.plots import style as plot_style
 from tankcal.report.uncertainty import budget, method, monte_carlo, rule
 from tankcal.report.uncertainty import figures as drawn
 from tankcal.report.uncertainty.stated import stated_rows, uneven_rows

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.patches import Rectangle
 
 from tankcal.methods.clouds import tables
-from tankcal.pipeline.plots.style import GREY, WIDTH, Drawing, styled
+from tankcal.report.plots.style import GREY, WIDTH, Drawing, styled
 
 FULL_COLOUR = 98  # percentile of absolute deviations that has the last colour
 LEAST_LIMIT_MM = 0.5  # smallest deviation of the last colour

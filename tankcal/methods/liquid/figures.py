@@ -4,8 +4,8 @@ import numpy as np
 
 from tankcal.methods.liquid import tables
 from tankcal.methods.liquid.facts import control_text, density_text, with_u
-from tankcal.pipeline.plots.style import FAINT, GREY, INK, RED, WIDTH, Drawing, set_margins, styled
 from tankcal.report import numbers
+from tankcal.report.plots.style import FAINT, GREY, INK, RED, WIDTH, Drawing, set_margins, styled
 
 MOST_ROWS = 16  # rows of the table of volumes in the documents; the workbook has all rows
 MARKERS = "osD^vP*X"  # marker of each run, as matplotlib names it

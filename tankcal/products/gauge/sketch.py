@@ -7,7 +7,7 @@ page are inches.
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from tankcal.pipeline.plots.style import GREY, INK, PALE, RED, WIDTH, styled
+from tankcal.report.plots.style import GREY, INK, PALE, RED, WIDTH, styled
 
 _HEIGHT, _TOP = 1.7, 1.25  # of the page, and of the drawn roof
 _LEFT, _RIGHT, _PIPE = 0.5, 2.6, 1.7  # walls of the tank, middle of the still pipe

@@ -6,8 +6,8 @@ from math import ceil, floor, log10
 
 import numpy as np
 
-from tankcal.pipeline.plots import style as plot_style
-from tankcal.pipeline.plots.style import INK, RED
+from tankcal.report.plots import style as plot_style
+from tankcal.report.plots.style import INK, RED
 
 COLOURS = (INK, RED, "#3b7d4f", "#b8860b", "#6a4c93", "#1b998b", "#8a5a44", "#555555")
 DASHES = ("-", "--", ":")

@@ -12,7 +12,6 @@ from matplotlib.patches import Rectangle
 
 from tankcal.calibration.edges import decentring_profile, radial_curve
 from tankcal.camera.model import KEYS, PARAMETERS, Form
-from tankcal.pipeline.plots.style import FAINT, GREY, INK, RED, WIDTH, even_groups, set_margins
 from tankcal.report import numbers
 from tankcal.report.camera.drawings import (
     draw_matrix,
@@ -26,6 +25,7 @@ from tankcal.report.camera.paper import number_names
 from tankcal.report.camera.parameters import is_in_pixels
 from tankcal.report.camera.product import unit_of
 from tankcal.report.camera.stability import number_calibrations
+from tankcal.report.plots.style import FAINT, GREY, INK, RED, WIDTH, even_groups, set_margins
 from tankcal.text.digits import fixed
 
 MAPS_IN_ROW, MOST_MAPS = 6, 36  # of a figure

@@ -5,9 +5,9 @@ import textwrap
 import numpy as np
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots.style import FAINT, GREY, INK, PALE, RED, WIDTH, set_margins
 from tankcal.report.camera.drawings import styled
 from tankcal.report.comparison.tables import FINE, shown_steps
+from tankcal.report.plots.style import FAINT, GREY, INK, PALE, RED, WIDTH, set_margins
 from tankcal.text.digits import fixed
 
 LABEL_LETTERS = 20  # letters in a line of the label below a bar

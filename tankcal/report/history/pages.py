@@ -10,7 +10,6 @@ import numpy as np
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots.style import FAINT, INK, RED, WIDTH, set_margins
 from tankcal.report import blocks
 from tankcal.report.camera.drawings import COLOURS, line_style, styled
 from tankcal.report.comparison.figures import draw_E_n_limits, typeset_E_n
@@ -25,6 +24,7 @@ from tankcal.report.history.tables import (
     volume_rows,
 )
 from tankcal.report.plain import Column
+from tankcal.report.plots.style import FAINT, INK, RED, WIDTH, set_margins
 from tankcal.report.saved_paper import bearable
 from tankcal.report.workbook.book import workbook_head
 from tankcal.report.workbook.sections import Sentences, SheetContent, cell_table, write_workbook

@@ -5,11 +5,11 @@ from math import ceil
 import numpy as np
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots.style import FAINT, GREY, INK, RED, WIDTH, set_margins
 from tankcal.report import blocks
 from tankcal.report.camera.drawings import line_style, styled
 from tankcal.report.inspection.paper import epoch_name
 from tankcal.report.inspection.tables import CHECKS, EDGES, POINTS, READING
+from tankcal.report.plots.style import FAINT, GREY, INK, RED, WIDTH, set_margins
 from tankcal.report.saved_paper import bearable
 from tankcal.report.tables import Column
 

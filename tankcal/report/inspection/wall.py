@@ -5,17 +5,6 @@ from math import ceil
 import numpy as np
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots import figures as plots
-from tankcal.pipeline.plots.style import (
-    FAINT,
-    GREY,
-    INK,
-    PALE,
-    RED,
-    WIDTH,
-    round_factor,
-    set_margins,
-)
 from tankcal.report import blocks
 from tankcal.report.camera.drawings import styled
 from tankcal.report.inspection.tables import (
@@ -31,6 +20,17 @@ from tankcal.report.inspection.tables import (
     limit_of_level,
     select_largest_gaps,
     worst_place,
+)
+from tankcal.report.plots import figures as plots
+from tankcal.report.plots.style import (
+    FAINT,
+    GREY,
+    INK,
+    PALE,
+    RED,
+    WIDTH,
+    round_factor,
+    set_margins,
 )
 
 KINDS = ("peaking", "banding")

@@ -3,7 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots.style import (
+from tankcal.report.planning.sketches import unrolled_wall
+from tankcal.report.plots.style import (
     GREY,
     INK,
     PALE,
@@ -13,7 +14,6 @@ from tankcal.pipeline.plots.style import (
     set_margins,
     styled,
 )
-from tankcal.report.planning.sketches import unrolled_wall
 
 MOST = 32  # bars in a figure
 LABELS, GAP = 2.4, 0.12  # inches: least width of the names of bars; space beside the longest name

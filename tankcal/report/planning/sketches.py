@@ -3,7 +3,10 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots.style import (
+from tankcal.planning.model import TAPED
+from tankcal.planning.places import full_turn, joints_m, place_of, reference_rad
+from tankcal.report.planning.rows import lost_points
+from tankcal.report.plots.style import (
     FAINT,
     GREY,
     INK,
@@ -13,9 +16,6 @@ from tankcal.pipeline.plots.style import (
     set_margins,
     styled,
 )
-from tankcal.planning.model import TAPED
-from tankcal.planning.places import full_turn, joints_m, place_of, reference_rad
-from tankcal.report.planning.rows import lost_points
 
 GREEN, OCHRE = "#2e7d5b", "#b9770e"
 SMALL = 6.5

@@ -4,7 +4,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
-from tankcal.pipeline.plots.style import GREY, INK, PALE, WIDTH, round_factor, styled
 from tankcal.planning.model import TAPED, Box
 from tankcal.planning.places import group_by_ends, reference_rad
 from tankcal.report.planning.sketches import (
@@ -16,6 +15,7 @@ from tankcal.report.planning.sketches import (
     has_own_marks,
     marks_of,
 )
+from tankcal.report.plots.style import GREY, INK, PALE, WIDTH, round_factor, styled
 
 HIGH = 4.6  # height of the figure, inches
 STEEP = 0.5  # sine of an azimuth; nearer to the y axis, names of stations are above or below

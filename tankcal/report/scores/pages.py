@@ -5,9 +5,9 @@ from math import ceil
 import numpy as np
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots.style import FAINT, GREY, WIDTH, set_margins
 from tankcal.report import blocks
 from tankcal.report.camera.drawings import COLOURS, line_style, styled
+from tankcal.report.plots.style import FAINT, GREY, WIDTH, set_margins
 from tankcal.report.saved_paper import bearable
 from tankcal.report.scores.paper import EVERY
 from tankcal.report.tables import Column, Table

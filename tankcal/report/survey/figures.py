@@ -15,7 +15,8 @@ import numpy as np
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots.style import (
+from tankcal.record.columns import as_columns
+from tankcal.report.plots.style import (
     FAINT,
     GREY,
     INK,
@@ -28,7 +29,6 @@ from tankcal.pipeline.plots.style import (
     set_margins,
     styled,
 )
-from tankcal.record.columns import as_columns
 from tankcal.report.survey.quality import select_adjusted
 
 MOST_PHOTOS = 12  # largest number of photos whose residuals are drawn

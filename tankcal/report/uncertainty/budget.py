@@ -1,8 +1,8 @@
 """Budgets: complete for the top row and one delivery, contributions for all others."""
 
-from tankcal.pipeline.plots.style import even_groups
 from tankcal.report import blocks
 from tankcal.report.numbers import degrees_of_freedom, like_its_sd, symbol
+from tankcal.report.plots.style import even_groups
 from tankcal.report.tables import Column, Table
 from tankcal.report.uncertainty.stated import UNLIMITED
 from tankcal.text.digits import NOTHING, decimals_of, fixed, shortest

@@ -4,8 +4,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, ScalarFormatter
 
-from tankcal.pipeline.plots.style import FAINT, INK, RED, WIDTH, set_margins, styled
 from tankcal.record.covariance_factor import factor_of
+from tankcal.report.plots.style import FAINT, INK, RED, WIDTH, set_margins, styled
 
 _SHORT_AXIS = 20  # ratio of the ends of an axis up to which minor ticks have numbers
 _MOST = 98  # smallest percentage of the differences within the frame

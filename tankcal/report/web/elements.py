@@ -320,7 +320,7 @@ def _first_cell(block):
 # ---- fonts of SVG images
 
 
-_FAMILY = "STIXGeneral"  # font of tankcal.pipeline.plots.style, part of matplotlib
+_FAMILY = "STIXGeneral"  # font of tankcal.report.plots.style, part of matplotlib
 _TEXT = re.compile(r"<(?:text|tspan)\b[^>]*>([^<]*)")
 _ROOT = re.compile(r"<svg\b[^>]*>")
 _STYLES = {"": "STIXGeneral", "italic": "STIXGeneralItalic", "bold": "STIXGeneralBol"}

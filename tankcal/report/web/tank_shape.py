@@ -9,8 +9,8 @@ from math import sqrt
 
 import numpy as np
 
-from tankcal.pipeline.plots.style import round_factor
 from tankcal.report.blocks import Block
+from tankcal.report.plots.style import round_factor
 from tankcal.report.web.packing import pack_numbers
 from tankcal.report.web.wall_map import limit_rejected
 

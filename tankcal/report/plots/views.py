@@ -55,7 +55,7 @@ def plot(result, what: str | None = None) -> "Figure":
 
 def _drawn(draw, result):
     # matplotlib is loaded when something is drawn
-    from tankcal.pipeline.plots import figures as plots
+    from tankcal.report.plots import figures as plots
 
     return draw(plots, result)
 

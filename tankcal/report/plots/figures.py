@@ -1,7 +1,7 @@
 """Drawings of a calibrated tank: sections, unrolled wall, capacity table and uncertainty budget.
 
 The functions take plain numbers and return `Drawing`s in the style of
-`tankcal.pipeline.plots.style`. Axis labels come from WORDS, or from `words(key, **values)`.
+`tankcal.report.plots.style`. Axis labels come from WORDS, or from `words(key, **values)`.
 """
 
 import textwrap
@@ -11,7 +11,7 @@ from math import ceil
 import numpy as np
 from matplotlib.collections import EllipseCollection
 
-from tankcal.pipeline.plots.style import (
+from tankcal.report.plots.style import (
     FAINT,
     GREY,
     INK,

@@ -5,8 +5,8 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots.figures import bottom_rows, capacity_curves
-from tankcal.pipeline.plots.style import STYLE
+from tankcal.report.plots.figures import bottom_rows, capacity_curves
+from tankcal.report.plots.style import STYLE
 from tankcal.report.survey.figures import Label, write_labels
 
 
