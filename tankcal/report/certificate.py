@@ -25,7 +25,7 @@ _PARTIES = (
 # Blank lines to fill in by hand if the job does not give these entries.
 _WRITTEN_BY_HAND = ("laboratory", "laboratory_address", "customer", "customer_address", "place")
 _CALIBRATION = (
-    *("method", "procedure", "deviations", "operator", "equipment", "instruments"),
+    *("method", "standard", "procedure", "deviations", "operator", "equipment", "instruments"),
     *("traceability", "conditions", "condition_of_tank", "external_results", "customer_data"),
 )
 _ASKED_FOR = ("method", "traceability", "conditions", "condition_of_tank")

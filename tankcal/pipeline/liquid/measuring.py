@@ -38,7 +38,7 @@ from tankcal.pipeline.tanks.corrections import Correction
 from tankcal.tank.liquid import fill_of, name_causes
 from tankcal.tank.liquid.reduction import batch_sd_m3
 
-ISO_4269 = "ISO 4269:2001"
+BALANCE = "balance"  # code of the principle: conservation of mass
 OF_NO_WEIGHT_M = 1.0  # standard deviation of a dip without weight, m
 # Causes that change all volumes: the effect of an undetectable size of them is reported.
 CONTROLLED = ("meter", "leak")
@@ -112,7 +112,7 @@ class Measured:
         )
         size = top_m3 - gross_m3 - sum_m3
         formula = message("by_liquid", "adjusted together with the metered volumes")
-        return Correction("liquid", True, size, 100 * size / gross_m3, formula, ISO_4269)
+        return Correction("liquid", True, size, 100 * size / gross_m3, formula, BALANCE)
 
     def result(self, levels_m):
         """Return the `LiquidResult` at the rows of a table."""

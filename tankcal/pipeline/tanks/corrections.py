@@ -9,9 +9,13 @@ from tankcal.messages import Message, message
 from tankcal.pipeline.tanks import as_surveyed, body_of, thermal_scale
 from tankcal.units import STANDARD_GRAVITY
 
-# Cited by title and edition only: the texts of paid standards were not read, so no clause is cited.
-ISO_7507 = "ISO 7507-1:2003"
-TIMOSHENKO = "Timoshenko & Woinowsky-Krieger, Theory of Plates and Shells"
+# Codes of the principle that a formula follows from: [sources_of_corrections] of the words. A
+# standard is named in a certificate only if the laboratory declares it (`certificate.standard`).
+GEOMETRY = "geometry"
+EXPANSION = "expansion"
+THIN_SHELL = "thin_shell"
+BUOYANCY = "buoyancy"
+DECLARED = "declared"
 INSIDE_PLATE = message("inside_plate", "r_inside = r − t")
 INSIDE_PAINT = message("inside_paint", "r_inside = r − t − paint")
 # No correction, except tilt, which the surveyed sections include.
@@ -32,6 +36,7 @@ class Correction:
         The same in percent.
     formula : Message
     source : str
+        Code of the principle that the formula follows from, such as "geometry".
     """
 
     code: str
@@ -119,7 +124,7 @@ def _applicable_corrections(job, survey):
     if job.tank.kind == "sphere":
         shell_corrections = (_pressure_correction(job),)
     declared = message("sum_of_volumes", "sum of the declared volumes")
-    deadwood = ("deadwood", bool(job.deadwood), declared, ISO_7507)
+    deadwood = ("deadwood", bool(job.deadwood), declared, DECLARED)
     return [*_length_corrections(job), *shell_corrections, deadwood]
 
 
@@ -130,18 +135,18 @@ def _length_corrections(job):
     parts = job.courses or job.rings
     plates = any(c.thickness_m for c in parts) or (solid and solid.thickness_m)
     return (
-        ("plate", outside and bool(plates), INSIDE_PLATE, ISO_7507),
+        ("plate", outside and bool(plates), INSIDE_PLATE, GEOMETRY),
         (
             "paint",
             outside and any(c.paint_m for c in parts),
             INSIDE_PAINT,
-            ISO_7507,
+            GEOMETRY,
         ),
         (
             "temperature",
             job.survey.shell_temperature_c is not None,
             _thermal_formula(job),
-            ISO_7507,
+            EXPANSION,
         ),
     )
 
@@ -176,17 +181,17 @@ def _shell_corrections(job, wall):
                 "horizontal_cut",
                 "horizontal cut: area of the cut square to the axis times √(1 + m²); contained",
             ),
-            ISO_7507,
+            GEOMETRY,
         ),
         (
             "head",
             bool(table.liquid_density_kg_m3 or survey.liquid_density_kg_m3),
             head,
-            f"{ISO_7507}; API MPMS 2.2A",
+            THIN_SHELL,
         ),
-        ("bottom", job.bottom.form != "flat", BOTTOM_FORMULAS[job.bottom.form], ISO_7507),
-        ("top", job.top is not None, TOP_FORMULA, ISO_7507),
-        ("roof", roof is not None, _roof_formula(roof), f"{ISO_7507}; API MPMS 2.2A"),
+        ("bottom", job.bottom.form != "flat", BOTTOM_FORMULAS[job.bottom.form], GEOMETRY),
+        ("top", job.top is not None, TOP_FORMULA, GEOMETRY),
+        ("roof", roof is not None, _roof_formula(roof), BUOYANCY),
     )
 
 
@@ -206,7 +211,7 @@ def _pressure_correction(job):
         survey_kg_m3=load.survey_density_kg_m3,
         level_m=load.survey_level_m,
     )
-    return ("head", load.is_there, formula, TIMOSHENKO)
+    return ("head", load.is_there, formula, THIN_SHELL)
 
 
 SURVEYED_BOTTOM = message(

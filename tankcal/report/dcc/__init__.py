@@ -57,7 +57,6 @@ _UNITS = {  # {printed unit: unit of the value}; values are in SI, angles in deg
     "kg/m3": DENSITY,
     "": ONE,
 }
-_PUBLISHERS = ("ISO", "IEC", "OIML", "API", "EN", "ABNT", "JCGM")
 
 
 def certificate_xml(record, digest, language=None):
@@ -111,31 +110,19 @@ def add_results(parent, languages, digest):
 
 
 def _methods(parent, languages):
-    """Add the method of the job with the standards of its corrections, and the method of U."""
+    """Add the method of the job with the standard that it declares, and the method of U."""
     record = languages.record
     method = add_child(parent, "usedMethod", refType="tankcal_method")
     add_text(method, "name", languages.label("method"))
     names = (clean(languages.job["certificate"].get(key)) for key in ("method", "procedure"))
     add_text(method, "description", languages.or_not_stated("; ".join(filter(None, names))))
-    for source in _sources(record):
-        is_norm = source.split()[0] in _PUBLISHERS
-        add_child(method, "norm" if is_norm else "reference", source)
+    if standard := clean(languages.job["certificate"].get("standard")):
+        add_child(method, "norm", standard)
     uncertain = add_child(parent, "usedMethod", refType="basic_methodMeasurementUncertainty")
     add_text(uncertain, "name", languages.word("headings.uncertainty"))
     add_child(uncertain, "norm", "JCGM 100:2008")
     if record.get("monte_carlo"):
         add_child(uncertain, "norm", "JCGM 101:2008")
-
-
-def _sources(record):
-    """Return the different sources of the applied corrections, standards first."""
-    sources = [
-        correction["source"]
-        for correction in record["corrections"]
-        if correction["applied"] and correction["source"]
-    ]
-    parts = dict.fromkeys(clean(part) for source in sources for part in source.split(";"))
-    return sorted(filter(None, parts), key=lambda part: part.split()[0] not in _PUBLISHERS)
 
 
 def _software(parent, record):

@@ -17,7 +17,15 @@ UNKNOWN_COUNTRY = "ZZ"  # not stated: a code that ISO 3166-1 reserves for users
 NAMESPACE = "tankcal"
 _LINK = "docs/certificate-digital.md"  # page of tankcal on its types
 _OTHER_ELEMENTS = (  # keys of the certificate with elements of their own
-    *("number", "country", "date_of_issue", "method", "procedure", "accreditation_number"),
+    *(
+        "number",
+        "country",
+        "date_of_issue",
+        "method",
+        "standard",
+        "procedure",
+        "accreditation_number",
+    ),
     *("laboratory", "laboratory_address", "customer", "customer_address"),
     *("authorised_by", "authorised_role", "operator", "notice"),
 )

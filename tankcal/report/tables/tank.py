@@ -159,6 +159,11 @@ def _correction(paper, row):
     return sentence(paper.words, "corrections", row["code"])
 
 
+def _source_of_correction(paper, row):
+    """Return the principle behind a formula; earlier versions saved a title in place of a code."""
+    return paper.words["sources_of_corrections"].get(row["source"], row["source"])
+
+
 CORRECTIONS = Table(
     "corrections",
     (
@@ -168,7 +173,7 @@ CORRECTIONS = Table(
         Column("size_percent", "percent", decimals=3, sheet="size_percent", width=10,
                in_sheet={"decimals": 4}),
         Column("formula", formulas=True, sheet="formula", width=40),
-        Column("source", sheet="source", width=34),
+        Column("source", text=_source_of_correction, sheet="source", width=34),
     ),
     rows=lambda record: record["corrections"],
 )  # fmt: skip
