@@ -353,31 +353,56 @@ function quantityOf(tank, table, given) {
     gaugings[place] = gaugingOf(tank, given[place], place, given.insulated);
     steps[place] = followChain(tank, gaugings[place], liquid, place);
   }
-  return { base_density: base.value, steps, moved: differences(tank, table, given, gaugings, steps) };
+  const standard = standardUncertainties(tank, given, places);
+  return {
+    base_density: base.value,
+    steps,
+    moved: differences(tank, table, standard, gaugings, steps),
+    rooms: roomsOf(tank, table, standard, gaugings.closing, steps.closing, liquid.expansion),
+  };
 }
 
-/** {quantity: {value, U, k}} of closing - opening, or of the closing alone. */
-function differences(tank, table, given, gaugings, steps) {
+/** {input: standard uncertainty}. */
+function standardUncertainties(tank, given, places) {
   const { u } = given;
   const standard = {
     tape: u.u_tape / 1e6, thermometer: u.u_thermometer, density: u.u_density, vcf: 1,
     ambient: u.u_ambient, sw: given.sw === null ? 0 : u.u_sw / 100, expansion: u.u_expansion,
   };
-  const [gross, net] = [{}, {}]; // factors of TOV, and of TOV - FW
-  let inverse = 0;
-  for (const [place, gauging] of Object.entries(gaugings)) {
+  for (const place of places) {
     standard[`dip ${place}`] = u.u_dip / 1000;
     standard[`water ${place}`] = u.u_water / 1000;
     standard[`temperature ${place}`] = u.u_temperature;
     standard[`table ${place}`] = tank.interpolation_m3 / Math.sqrt(3);
-    const water = gauging.water === null ? null : table.columnsAt(gauging.water);
-    gross[place] = table.columnsAt(gauging.level).map((value) => value / tank.unit_factor);
-    net[place] = gross[place].map((value, column) =>
-      value - (water ? water[column] / tank.unit_factor : 0));
-    const { row } = steps[place];
-    for (const height of [tank.heights[row], tank.heights[row + 1]]) {
-      inverse = Math.max(inverse, table.inverseDof(table.columnsAt(height)));
-    }
+  }
+  return standard;
+}
+
+/** Factor of the table at a dip, in m3 for each column. */
+const factorAt = (tank, table, height) =>
+  table.columnsAt(height).map((value) => value / tank.unit_factor);
+
+/** 1/dof of the table at a dip: the larger of the rows about it. */
+const inverseDofAt = (tank, table, row) => Math.max(...[row, row + 1].map((at) =>
+  table.inverseDof(table.columnsAt(tank.heights[at]))));
+
+/** {value, U, k} of a number with derivatives, and the variance by the table. */
+function stated(table, total, standard, byTable, inverse) {
+  const variance = Object.entries(total.slopes).reduce((all, [name, slope]) =>
+    all + (slope * (standard[name] ?? 0)) ** 2, byTable);
+  const k = table.coverage(variance > 0 ? (byTable / variance) ** 2 * inverse : 0);
+  return { value: total.value, U: k * Math.sqrt(variance), k };
+}
+
+/** {quantity: {value, U, k}} of closing - opening, or of the closing alone. */
+function differences(tank, table, standard, gaugings, steps) {
+  const [gross, net] = [{}, {}]; // factors of TOV, and of TOV - FW
+  let inverse = 0;
+  for (const [place, gauging] of Object.entries(gaugings)) {
+    const water = gauging.water === null ? null : factorAt(tank, table, gauging.water);
+    gross[place] = factorAt(tank, table, gauging.level);
+    net[place] = gross[place].map((value, column) => value - (water ? water[column] : 0));
+    inverse = Math.max(inverse, inverseDofAt(tank, table, steps[place].row));
   }
   const moved = {};
   for (const name of QUANTITIES) {
@@ -387,12 +412,32 @@ function differences(tank, table, given, gaugings, steps) {
     const byTable = factors.closing.reduce((variance, _, column) => variance
       + Object.keys(factors).reduce((part, place) =>
         part + (total.slopes[`table ${place}`] ?? 0) * factors[place][column], 0) ** 2, 0);
-    const variance = Object.entries(total.slopes).reduce((all, [input_, slope]) =>
-      all + (slope * (standard[input_] ?? 0)) ** 2, byTable);
-    const k = table.coverage(variance > 0 ? (byTable / variance) ** 2 * inverse : 0);
-    moved[name] = { value: total.value, U: k * Math.sqrt(variance), k };
+    moved[name] = stated(table, total, standard, byTable, inverse);
   }
   return moved;
+}
+
+/** [{name, level_m, value, U, k}] of the observed volumes between the closing and each level. */
+function roomsOf(tank, table, standard, gauging, closing, expansion) {
+  const present = plus(times(closing.tov, closing.ctsh), closing.fra);
+  const here = factorAt(tank, table, gauging.level);
+  return tank.rooms.map(({ name, level_m: level, sign }) => {
+    const { volume, row } = tableVolume(tank, lift(level));
+    const ctsh = shellFactor(tank, lift(level), closing.shell, expansion);
+    // Below its critical zone the roof rests on its legs, and displaces no liquid.
+    const isResting = tank.roof && level < tank.roof.critical_top_m;
+    const full = plus(times(volume, ctsh), isResting ? 0 : closing.fra);
+    const total = times(sign, minus(full, present));
+    // An error of the table at the level acts like the error at the dip, with other sign.
+    const slope = total.slopes["table closing"];
+    const there = factorAt(tank, table, level);
+    const byTable = here.reduce((variance, value, column) =>
+      variance + (slope * (value - there[column])) ** 2, 0);
+    total.slopes["table level"] = -slope;
+    const inverse = Math.max(...[closing.row, row].map((at) => inverseDofAt(tank, table, at)));
+    const own = { ...standard, "table level": standard["table closing"] };
+    return { name, level_m: level, ...stated(table, total, own, byTable, inverse) };
+  });
 }
 return { quantityOf, Refusal };
 })();

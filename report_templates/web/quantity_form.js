@@ -72,7 +72,7 @@
       (key) => [key, fields[key].value])),
     ...Object.fromEntries(["alpha", "density", "sample", "sw"].map((key) => [key, numberIn(key)])),
     insulated: fields.insulated.checked,
-    u: Object.fromEntries(Object.keys(tank.u).map((key) => [key, numberIn(key)])),
+    u: Object.fromEntries(tank.u.map(([key]) => [key, numberIn(key)])),
     opening: gaugingIn("opening"),
     closing: gaugingIn("closing"),
   });
@@ -82,10 +82,22 @@
   remark.setAttribute("role", "status");
   const cell = (text) => make("td", text, { className: "decimal" });
 
-  const showResult = (result) => {
+  const headRow = (title, keys) => {
     const head = make("tr");
-    head.append(make("th"), ...["opening", "closing", "difference", "expanded", "k"].map(
-      (key) => make("th", spelt.columns[key], { scope: "col" })));
+    head.append(make("th", title), ...keys.map((key) => make("th", spelt.columns[key], { scope: "col" })));
+    return head;
+  };
+  const decimalsOfU = (U) => Math.max(decimalsOf(U), 0);
+  /** Rows of the volumes between the closing gauging and the operating levels. */
+  const roomRows = (rooms) => rooms.map(({ name, level_m, value, U, k }) => {
+    const row = make("tr");
+    row.append(make("th", `${spoken.rooms[name]} (m³)`, { scope: "row" }), cell(""),
+      cell(fixed(level_m, 4)), cell(fixed(value, 3)), cell(fixed(U, decimalsOfU(U))), cell(fixed(k, 2)));
+    return row;
+  });
+
+  const showResult = (result) => {
+    const head = headRow("", ["opening", "closing", "difference", "expanded", "k"]);
     const rows = STEPS.map(([key, decimals, unit]) => {
       const row = make("tr");
       const values = ["opening", "closing"].map((place) =>
@@ -93,7 +105,7 @@
       const moved = result.moved[key];
       const U = moved ? [
         fixed(moved.value, decimals),
-        fixed(moved.U, Math.max(decimalsOf(moved.U), 0)),
+        fixed(moved.U, decimalsOfU(moved.U)),
         fixed(moved.k, 2),
       ] : ["", "", ""];
       row.append(make("th", spelt.labels[key] + (unit ? ` (${unit})` : ""), { scope: "row" }),
@@ -102,6 +114,12 @@
     });
     const body = make("tbody");
     body.append(head, ...rows);
+    const rooms = roomRows(result.rooms);
+    if (rooms.length) {
+      const room = headRow(spoken.rooms.rooms, ["level", "volume", "expanded", "k"]);
+      room.firstChild.after(make("th"));
+      body.append(room, ...rooms);
+    }
     table.replaceChildren(body);
   };
 
@@ -134,13 +152,13 @@
     group(spelt.columns.product, [...PRODUCT, "insulated"].map((key) => field(key))),
     ...["opening", "closing"].map((place) => group(`${spelt.headings.gauging}: ${heading(place)}`,
       GAUGING.map((key) => field(key, `${key}-${place}`)))),
-    group(spelt.headings.uncertainty, Object.keys(tank.u).map((key) => field(key))),
+    group(spelt.headings.uncertainty, tank.u.map(([key]) => field(key))),
     remark,
     table,
     make("p", spelt.notes.steps, { className: "note" }),
     make("p", spelt.notes.uncertainty, { className: "note" }),
   );
-  for (const [key, value] of Object.entries(tank.u)) {
+  for (const [key, value] of tank.u) {
     if (value !== null) fields[key].value = String(value).replace(".", marks.decimal);
   }
   form.hidden = false;

@@ -75,6 +75,39 @@ LIMITS = {
     "sw_percent": (0, 20),
 }
 
+# Volumes between the closing gauging and an operating level: key of the level, sign.
+ROOMS = {
+    "room": ("maximum_m", 1),  # can still be received
+    "above_minimum": ("minimum_m", -1),
+    "pumpable": ("pump_suction_m", -1),  # can be delivered
+}
+
+
+def room_levels(levels, first_m, last_m, critical_m=None):
+    """Operating levels of the rooms that a table can state.
+
+    Parameters
+    ----------
+    levels : Mapping
+        Section [levels] of a job: {"maximum_m": dip or None ...}.
+    first_m, last_m : float
+        Lowest and highest dip of the table.
+    critical_m : tuple of float, optional
+        Lowest and highest dip of the critical zone of a floating roof.
+
+    Returns
+    -------
+    dict
+        {name of ROOMS: dip}, without levels outside the table or inside the critical zone.
+    """
+    dips = {name: levels.get(key) for name, (key, _) in ROOMS.items()}
+    low, high = critical_m or (last_m, last_m)
+    return {
+        name: dip
+        for name, dip in dips.items()
+        if dip is not None and first_m <= dip <= last_m and not low < dip < high
+    }
+
 
 def assumed_u_vcf(temperature_c, base_c):
     """Standard uncertainty of a volume correction factor by the assumed rule, relative.

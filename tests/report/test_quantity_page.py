@@ -8,7 +8,18 @@ import numpy as np
 import pytest
 from browser import Browser
 from calculated_tanks import afloat, example_with_rows
-from quantity_cases import CASES, CLOSING, GRID, STEPS, ULLAGES, case, ticket_of
+from quantity_cases import (
+    CASES,
+    CLOSING,
+    GRID,
+    LEVELS,
+    LEVELS_OF_ROOF,
+    STEPS,
+    ULLAGES,
+    case,
+    save_with_levels,
+    ticket_of,
+)
 
 from tankcal.errors import InputError
 from tankcal.products.quantity.chain import QUANTITIES
@@ -88,16 +99,16 @@ def run(record, cases, folder):
 
 
 TANKS = {
-    "upright": (lambda folder: example_with_rows(0.2, folder), CASES | GRID),
-    "roofed": (afloat, ULLAGES),
+    "upright": (lambda folder: example_with_rows(0.2, folder), LEVELS, CASES | GRID),
+    "roofed": (afloat, LEVELS_OF_ROOF, ULLAGES),
 }
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", TANKS)
 def test_the_page_shows_the_numbers_of_the_ticket(kind, tmp_path):
-    make, cases = TANKS[kind]
-    record = make(tmp_path)[1]
+    make, levels, cases = TANKS[kind]
+    record = save_with_levels(make(tmp_path)[1], levels, tmp_path)
     table = read_table(tmp_path / "record.json")
     results = run(record, [given_of(sections) for sections in cases.values()], tmp_path)
     for (key, sections), result in zip(cases.items(), results, strict=True):
@@ -121,6 +132,14 @@ def test_the_page_shows_the_numbers_of_the_ticket(kind, tmp_path):
             assert moved["value"] == pytest.approx(total.value[0, place], rel=SAME), (key, name)
             assert moved["U"] == pytest.approx(total.U[0, place], rel=SAME_U), (key, name)
             assert moved["k"] == pytest.approx(total.k[0, place], rel=1e-6), (key, name)
+        rooms = transfer.rooms()
+        assert [room["name"] for room in result["rooms"]] == list(transfer.room_levels)
+        for place, found in enumerate(result["rooms"]):
+            name = found["name"]
+            assert found["level_m"] == transfer.room_levels[name]
+            assert found["value"] == pytest.approx(rooms.value[0, place], rel=SAME, abs=1e-9), key
+            assert found["U"] == pytest.approx(rooms.U[0, place], rel=SAME_U), (key, name)
+            assert found["k"] == pytest.approx(rooms.k[0, place], rel=1e-6), (key, name)
 
 
 OUTSIDE = {  # values that the reader of tickets refuses
@@ -159,7 +178,7 @@ TYPED = [
 
 @pytest.mark.slow
 def test_the_form_shows_the_stock_or_the_reason_of_a_refusal(tmp_path):
-    record = afloat(tmp_path)[1]
+    record = save_with_levels(afloat(tmp_path)[1], LEVELS_OF_ROOF, tmp_path)
     shown = [blocks.document(title="T").data, calculator(Paper(record, load_words("en"))).data]
     (tmp_path / "page.html").write_text(page(shown, has_contents=False), encoding="utf-8")
     with Browser() as browser:
@@ -170,6 +189,8 @@ def test_the_form_shows_the_stock_or_the_reason_of_a_refusal(tmp_path):
         assert browser.text("#quantity .answer").startswith("Blank: the results are the stock")
         table = browser.text("#quantity table")
         assert f"{record['capacity']['volume_m3'][36]:.3f}" in table.replace(",", "")  # at 9 m
+        assert "Room and stock at the closing gauging" in table
+        assert "Available room (m³)" in table
         browser.run(FILL % json.dumps([("dip-closing", "0.2")]))
         assert "floating roof does not float" in browser.text("#quantity .answer")
         assert browser.text("#quantity table").strip() == ""

@@ -5,13 +5,21 @@ second implementation. The sheet computes the same steps by formulas, with deriv
 form where the tickets use complex steps.
 """
 
-import json
-
 import numpy as np
 import openpyxl
 import pytest
 from calculated_tanks import afloat, example_with_rows
-from quantity_cases import CASES, GRID, STEPS, ULLAGES, case, ticket_of
+from quantity_cases import (
+    CASES,
+    GRID,
+    LEVELS,
+    LEVELS_OF_ROOF,
+    STEPS,
+    ULLAGES,
+    case,
+    save_with_levels,
+    ticket_of,
+)
 from recalculation import recalculated
 
 from tankcal.errors import InputError
@@ -86,6 +94,10 @@ class Filled:
         """Opening, closing, difference, U and k of a step."""
         return self._rows[self._words["quantity"]["labels"][key].rsplit(" (", 1)[0]]
 
+    def room(self, name):
+        """Level, volume, U and k of a room."""
+        return self._rows[self._words["ticket"]["labels"][f"ticket_{name}"]][1:]
+
     def remark(self, key):
         return self._rows[self._words["quantity"]["columns"][key]][0]
 
@@ -128,7 +140,7 @@ def pairs_of(make, cases, folder):
 
 
 def example(folder):
-    return example_with_rows(0.2, folder)[1]
+    return save_with_levels(example_with_rows(0.2, folder)[1], LEVELS, folder)
 
 
 @pytest.fixture(scope="module")
@@ -143,15 +155,18 @@ def grid(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def roofed(tmp_path_factory):
-    return pairs_of(lambda folder: afloat(folder)[1], ULLAGES, tmp_path_factory.mktemp("roofed"))
+    return pairs_of(
+        lambda folder: save_with_levels(afloat(folder)[1], LEVELS_OF_ROOF, folder),
+        ULLAGES, tmp_path_factory.mktemp("roofed"),
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def lying(tmp_path_factory, records_of_kinds):
     def make(folder):
-        record = records_of_kinds["lying"]
-        (folder / "record.json").write_text(json.dumps(record), encoding="utf-8")
-        return record
+        shares = {"maximum_m": 0.93, "minimum_m": 0.21, "pump_suction_m": 0.047}
+        levels = {"full_m": None} | {key: round(share * top, 3) for key, share in shares.items()}
+        return save_with_levels(records_of_kinds["lying"], levels, folder)
 
     top = records_of_kinds["lying"]["capacity"]["height_m"][-1]
     gaugings = {
@@ -185,6 +200,14 @@ def compare(ticket, sheet):
         assert moved == pytest.approx(total.value[0, place], rel=SAME), name
         assert pytest.approx(total.U[0, place], rel=SAME) == U, name
         assert k == pytest.approx(total.k[0, place], rel=SAME), name
+    rooms = transfer.rooms()
+    assert len(transfer.room_levels) == 3
+    for place, (name, dip) in enumerate(transfer.room_levels.items()):
+        level, value, U, k = sheet.room(name)
+        assert level == dip
+        assert value == pytest.approx(rooms.value[0, place], rel=SAME, abs=1e-9), name
+        assert pytest.approx(rooms.U[0, place], rel=SAME) == U, name
+        assert k == pytest.approx(rooms.k[0, place], rel=SAME), name
 
 
 @pytest.mark.parametrize("key", CASES)

@@ -15,6 +15,10 @@ STEPS = {
 OPENING = {"dip_m": 2.317, "water_dip_m": 0.412, "temperature_c": 18.4, "ambient_c": 25.0}
 CLOSING = {"dip_m": 8.642, "water_dip_m": 0.512, "temperature_c": 31.2, "ambient_c": 29.0}
 
+# Operating levels, m: of the upright tank, and of the tank with a roof that floats from 1.3 m.
+LEVELS = {"full_m": None, "maximum_m": 9.333, "minimum_m": 1.207, "pump_suction_m": 0.313}
+LEVELS_OF_ROOF = LEVELS | {"minimum_m": 0.907}
+
 
 def case(correction, density, *, opening=OPENING, closing=CLOSING, shell=None, u=None, **product):
     sections = {
@@ -100,6 +104,13 @@ ULLAGES = {
                        opening={"dip_m": 4.111, "temperature_c": 25.0, "ambient_c": 20.0},
                        closing={"dip_m": 9.0, "temperature_c": 28.0, "ambient_c": 20.0}),
 }  # fmt: skip
+
+
+def save_with_levels(record, levels, folder):
+    """Record with the operating levels of its tank, also saved as record.json."""
+    record = {**record, "job": {**record["job"], "levels": levels}}
+    (folder / "record.json").write_text(json.dumps(record), encoding="utf-8")
+    return record
 
 
 def ticket_of(sections, folder, table):

@@ -14,6 +14,7 @@ from tankcal.record.covariance_factor import factor_of
 from tankcal.record.manifest import digest_of
 from tankcal.record.schema import Saved, to_plain
 from tankcal.tank.fittings import FloatingRoof, floating_roof
+from tankcal.tank.gauging import room_levels
 
 
 @dataclass(frozen=True)
@@ -102,12 +103,11 @@ class TankTable:
             return np.zeros(np.shape(level_m), dtype=bool)
         return level_m < self.roof.critical_top_m
 
-    def is_for_use(self, level_m):
-        """Whether a dip is in the table and outside the critical zone of the roof."""
-        if self.is_outside(level_m):
-            return False
+    def room_levels(self):
+        """{name of ROOMS: dip} of the operating levels of the tank that are for use."""
         roof = self.roof
-        return roof is None or not roof.critical_bottom_m < level_m < roof.critical_top_m
+        zone = None if roof is None else (roof.critical_bottom_m, roof.critical_top_m)
+        return room_levels(self.levels, self.height_m[0], self.height_m[-1], zone)
 
     def roof_correction_m3(self, observed_kg_m3):
         """Correction FRA of a volume of the table for the roof, m3, at (n,) observed densities."""

@@ -20,16 +20,10 @@ from tankcal.products.quantity.chain import (
     follow_chain,
 )
 from tankcal.products.quantity.table import TankTable
-from tankcal.tank.gauging import assumed_u_vcf
+from tankcal.tank.gauging import ROOMS, assumed_u_vcf
 
 STEP = 1e-30  # of complex steps; far below rounding, so that derivatives are exact
 STATES = ("opening", "closing")
-# Volumes between the closing gauging and an operating level: key of the level, sign.
-ROOMS = {
-    "room": ("maximum_m", 1),  # can still be received
-    "above_minimum": ("minimum_m", -1),
-    "pumpable": ("pump_suction_m", -1),  # can be delivered
-}
 
 
 @dataclass(frozen=True)
@@ -104,12 +98,7 @@ class Transfer:
     @cached_property
     def room_levels(self):
         """{name of ROOMS: dip} of the operating levels of the tank that are for use."""
-        dips = {name: self.table.levels.get(key) for name, (key, _) in ROOMS.items()}
-        return {
-            name: dip
-            for name, dip in dips.items()
-            if dip is not None and self.table.is_for_use(dip)
-        }
+        return self.table.room_levels()
 
     def rooms(self):
         """`Quantities` (n, rooms) of the closing gauging, in the order of `room_levels`.

@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass
 from itertools import groupby
 
+from tankcal.tank.gauging import room_levels
+
 
 @dataclass(frozen=True)
 class Group:
@@ -26,6 +28,16 @@ def critical_zone(record):
 def roof_of(record):
     """Return the values of the floating roof, {code: value}."""
     return {line["code"]: line["value"] for line in record["roof"]}
+
+
+def room_levels_of(record):
+    """Return {name of a room: dip} of the operating levels that the calculators can use."""
+    heights = record["capacity"]["height_m"]
+    zone = None
+    if record["roof"]:
+        roof = roof_of(record)
+        zone = roof["roof_critical_bottom"], roof["roof_critical_top"]
+    return room_levels(record["job"].get("levels") or {}, heights[0], heights[-1], zone)
 
 
 def is_roof_in_table(record):

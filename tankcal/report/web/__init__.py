@@ -11,6 +11,7 @@ from html import escape
 
 from tankcal.report.web.elements import PIECE, block_html, frame_table, searchable_table
 from tankcal.report.web.packing import script_data
+from tankcal.tank.gauging import ROOMS
 from tankcal.text.shipped import DEFAULT, LANGUAGES, shipped_folder
 from tankcal.text.words import load_words
 
@@ -40,6 +41,8 @@ def page(blocks, has_contents=True):
     spoken = {"words": words["web"], "marks": words["language"]["marks"]}
     if any(block["kind"] == "calculator" for block in blocks):
         spoken["quantity"] = words["quantity"]
+        labels = words["ticket"]["labels"]
+        spoken["rooms"] = {key: labels[f"ticket_{key}"] for key in ("rooms", *ROOMS)}
         spoken["refused"] = words["calculator"]["texts"]["refused"]
     return "\n".join(
         [

@@ -10,13 +10,20 @@ import numpy as np
 from tankcal.record.covariance_factor import factor_of
 from tankcal.report.blocks import Block
 from tankcal.report.numbers import unit
-from tankcal.report.uncertainty.sources import critical_zone, groups_of, is_roof_in_table, roof_of
+from tankcal.report.uncertainty.sources import (
+    critical_zone,
+    groups_of,
+    is_roof_in_table,
+    roof_of,
+    room_levels_of,
+)
 from tankcal.report.uncertainty.stated import flag_simulated, stated_rows, stated_U_m3
 from tankcal.report.web.packing import pack_numbers
 from tankcal.tank.fittings import AIR_KG_M3, WEIGHTS_KG_M3
 from tankcal.tank.gauging import (
     FIELDS_OF_U,
     LIMITS,
+    ROOMS,
     UNCERTAINTIES,
     UNITS_OF_U,
     VCF_AT_K,
@@ -153,9 +160,13 @@ def quantity_data(record):
         "zero_m": capacity["zero_m"],
         "interpolation_m3": interpolation["largest_m3"] if interpolation else 0.0,
         "roof": _roof_data(record),
+        "rooms": [
+            {"name": name, "level_m": dip, "sign": ROOMS[name][1]}
+            for name, dip in room_levels_of(record).items()
+        ],
         "air": AIR_KG_M3,
         "weights": WEIGHTS_KG_M3,
-        "u": {field: UNCERTAINTIES[name] for name, field in FIELDS_OF_U.items()},
+        "u": [(field, UNCERTAINTIES[name]) for name, field in FIELDS_OF_U.items()],
         "units_of_u": {field: UNITS_OF_U[name] for name, field in FIELDS_OF_U.items()},
         "input_limits": LIMITS,
         "vcf_rule": {"at_k": VCF_AT_K.tolist(), "percent": VCF_PERCENT.tolist(), "k": VCF_K},

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from tankcal.report.uncertainty.sources import room_levels_of
 from tankcal.report.workbook.calculator.cells import Places, quoted
 from tankcal.report.workbook.calculator.sentences import refused_word
 from tankcal.report.workbook.calculator.table import Table
@@ -95,7 +96,7 @@ def quantity_sheets(book, record):
     ]
     rows, results = _addresses(workings)
     form = _Form(book, Places(book, rows, KEYS), results, _sentences(book, table))
-    form.write()
+    form.write(room_levels_of(record))
     _workings_sheet(book, workings, form.places, form.texts)
 
 
@@ -148,19 +149,19 @@ class _Form:
         self.sheet = book.sheet(FORM, tab="input")
         book.widths(self.sheet, *_WIDTHS)
 
-    def write(self):
+    def write(self, room_names):
         """Write inputs, results and notes."""
-        row = self._heading(_FIRST_ROW, "product")
+        row = self._heading(_FIRST_ROW, self._word("headings.product"))
         for entry in _PRODUCT:
             row = self._inputs(row, entry, [entry.key])
         row = self._remark(row, "product")
-        row = self._heading(row + 1, "gauging", ("opening", "closing"))
+        row = self._heading(row + 1, self._word("headings.gauging"), ("opening", "closing"))
         for entry in _GAUGING:
             row = self._inputs(row, entry, [f"{entry.key}_{state}" for state in STATES])
-        row = self._heading(row + 1, "uncertainty")
+        row = self._heading(row + 1, self._word("headings.uncertainty"))
         for entry in _U:
             row = self._inputs(row, entry, [entry.key])
-        row = self._heading(row + 1, "results",
+        row = self._heading(row + 1, self._word("headings.results"),
                             ("opening", "closing", "difference", "expanded", "k"))  # fmt: skip
         for state in STATES:
             row = self._remark(row, f"state_{state}")
@@ -175,6 +176,7 @@ class _Form:
             row += 1
         for label, key, digits, unit in _STEPS:
             row = self._step(row, label, key, digits, unit)
+        row = self._rooms(row, room_names)
         for key in ("steps", "uncertainty", "typed", "hidden"):
             workings = self.book.sheet_name(WORKINGS)
             text = self.book.word(f"notes.{key}", of="quantity", workings=workings)
@@ -182,12 +184,12 @@ class _Form:
             row += 1
         self.sheet.fit_to_pages(1, 1)
 
-    def _heading(self, row, key, columns=()):
-        """Write a heading with the names of columns; return the next row."""
-        self.book.heading(self.sheet, row, self._word(f"headings.{key}"), len(_WIDTHS))
+    def _heading(self, row, text, columns=(), first=1):
+        """Write a heading with the names of columns from `first`; return the next row."""
+        self.book.heading(self.sheet, row, text, len(_WIDTHS))
         look = self.book.format(bold=True, align="right", font_color=ACCENT, bottom=1,
                                 bottom_color=ACCENT)  # fmt: skip
-        for column, name in enumerate(columns, start=1):
+        for column, name in enumerate(columns, start=first):
             self.sheet.write_string(row, column, self._word(f"columns.{name}"), look)
         return row + 1
 
@@ -261,6 +263,22 @@ class _Form:
             self._result(row, 4, f"U_{label}", digits, strong=True)
             self._result(row, 5, f"k_{label}", 2)
         return row + 1
+
+    def _rooms(self, row, names):
+        """Write the volumes to the operating levels, if the tank has any; return the next row."""
+        if not names:
+            return row
+        words = {name: self.book.word(f"labels.ticket_{name}", of="ticket")
+                 for name in ("rooms", *names)}  # fmt: skip
+        row = self._heading(row, words["rooms"], ("level", "volume", "expanded", "k"), first=2)
+        for name in names:
+            self.book.put(self.sheet, row, 0, f"{words[name]} (m³)")
+            self._result(row, 2, f"fill_level_{name}", 4)
+            self._result(row, 3, f"room_{name}", 3, strong=True)
+            self._result(row, 4, f"U_{name}", 3, strong=True)
+            self._result(row, 5, f"k_{name}", 2)
+            row += 1
+        return row
 
 
 def _workings_sheet(book, workings, places, texts):

@@ -71,16 +71,25 @@ def _levels(record, number):
     return [state_row("level", "h", level, 0), replace(states, cells=(opening, closing))]
 
 
-def _interpolate(key, level, symbol):
-    """Rows of the row of a dip, position above it, slope and volume."""
+def interpolation_formulas(key, level):
+    """Formulas of the row of a dip, position above it, slope and volume, {end of the key: text}."""
     low, high = (f"INDEX(capacity_height,[{key}_row@]{end})" for end in ("", "+1"))
     below, above = (f"INDEX(capacity_volume,[{key}_row@]{end})" for end in ("", "+1"))
     place = f"IF({level}<{_FIRST},1,MIN(MATCH({level},capacity_height,1),ROWS(capacity_height)-1))"
+    return {
+        "row": place,
+        "part": f"({level}-{low})/({high}-{low})",
+        "slope": f"({above}-{below})/({high}-{low})",
+        "volume": f"{below}+[{key}_part@]*({above}-{below})",
+    }
+
+
+def _interpolate(key, level, symbol):
+    """Rows of the row of a dip, position above it, slope and volume."""
+    symbols = {"slope": f"∂{symbol}/∂h", "volume": symbol}
     return [
-        state_row(f"{key}_row", "", _guard(place)),
-        state_row(f"{key}_part", "", _guard(f"({level}-{low})/({high}-{low})")),
-        state_row(f"{key}_slope", f"∂{symbol}/∂h", _guard(f"({above}-{below})/({high}-{low})")),
-        state_row(f"{key}_volume", symbol, _guard(f"{below}+[{key}_part@]*({above}-{below})")),
+        state_row(f"{key}_{part}", symbols.get(part, ""), _guard(formula))
+        for part, formula in interpolation_formulas(key, level).items()
     ]
 
 
