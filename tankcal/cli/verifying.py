@@ -88,7 +88,12 @@ def _print(result, status):
             "computed_by": again.computed_by,
             "numbers": again.numbers,
             "different": again.different,
-            "largest": None if again.largest is None else _finite(asdict(again.largest)),
+            "largest": None
+            if again.largest is None
+            else {
+                key: None if value == float("inf") else value
+                for key, value in asdict(again.largest).items()
+            },
             "agrees": again.agrees,
         },
         compared_by_hash_alone=result.by_hash,
@@ -96,10 +101,6 @@ def _print(result, status):
         notes=[str(note) for note in result.notes],
         problems=[problem_of(problem) for problem in result.problems],
     )
-
-
-def _finite(values):
-    return {key: None if value == float("inf") else value for key, value in values.items()}
 
 
 def _tell(result, hashes_only):

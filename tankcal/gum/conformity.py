@@ -85,7 +85,7 @@ def decide(value, lower, upper, guard):
 
     Examples
     --------
-    >>> [decide(value, 9.5, 10.5, 0.2) for value in (10.3, 10.4, 10.6, 10.8)]
+    >>> [decide(value, 9.5, 10.5, 0.2) for value in (10.2, 10.4, 10.6, 10.8)]
     ['passed', 'guard_band', 'guard_band_beyond', 'failed']
     """
     distance = distance_within(value, lower, upper)

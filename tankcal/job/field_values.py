@@ -209,7 +209,9 @@ def _read_text(field, raw, _decimal):
     else:
         text = str(raw)
     if field.kind == "text":
-        is_valid = len(text) <= MAX_TEXT and all(_is_writing(char) for char in text)
+        is_valid = len(text) <= MAX_TEXT and all(
+            (char.isprintable() or unicodedata.category(char) == "Zs") for char in text
+        )
     elif field.kind == "name":
         is_valid = is_name(text)
     else:
@@ -224,10 +226,6 @@ def _read_text(field, raw, _decimal):
     if not is_valid:
         raise _refused(field, shown(text))
     return meant(text, field.choices) or text
-
-
-def _is_writing(char):
-    return char.isprintable() or unicodedata.category(char) == "Zs"
 
 
 def _read_choice(field, raw, _decimal):

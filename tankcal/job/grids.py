@@ -29,7 +29,11 @@ def table_rows(place, grid, log):
     first_column : int
         Number of the first column.
     """
-    rows = [(number, cells) for number, cells in grid.rows if not _is_comment(cells)]
+    rows = [
+        (number, cells)
+        for number, cells in grid.rows
+        if not (isinstance(cells[0], str) and cells[0].lstrip().startswith("#"))
+    ]
     for number, cells in rows:
         if len(cells) > MAX_COLUMNS:
             log.problem(
@@ -69,10 +73,6 @@ def placed_columns(rows, first_column):
         for column, heading in enumerate(headings, first_column)
         if isinstance(heading, str)
     }
-
-
-def _is_comment(cells):
-    return isinstance(cells[0], str) and cells[0].lstrip().startswith("#")
 
 
 def _is_blank(cell):

@@ -8,6 +8,7 @@ record and report lie below the methods and ask for them at run time. A method i
 its own within the function that needs it, so that a job loads only the methods that it uses.
 """
 
+from collections import Counter
 from functools import cache
 from importlib import import_module
 
@@ -94,6 +95,9 @@ class Method:
         Forms of the field sheets: the tables filled in together, and the rows on a sheet.
     field_facts : tuple of str
         Facts at the head of the field sheets; (): the facts of a survey of the wall.
+    kind_of_readings : str
+        Kind of its readings in plans: "straps", "offsets", "hits" or "tangents"; "": not planned
+        by courses.
     csv_files : tuple of str
         Output files of `csv_tables`.
     hidden_sheets : tuple of str
@@ -128,6 +132,7 @@ class Method:
     comes_last = False
     field_forms = ()
     field_facts = ()
+    kind_of_readings = ""
     csv_files = ()
     hidden_sheets = ()
     saved_note = ""
@@ -267,6 +272,32 @@ class Method:
     def levels_read(self, job):
         """Set of (course, height above the table's zero, m) of the readings of a `Job`."""
         return set()
+
+    def courses_of_readings(self, job):
+        """Course of each reading of the wall of a `Job`, with repetitions."""
+        return ()
+
+    def instruments_in_use(self, job):
+        """Names of the instruments of the readings of a `Job`, and of the masters of tapes."""
+        return set()
+
+    def detectable_m(self, job, wall, sights):
+        """Minimal detectable blunder of each reading, m; inf: not controlled by other readings.
+
+        Parameters
+        ----------
+        job : Job
+        wall : object
+            Survey of the job.
+        sights : object
+            Sights that `find` returned.
+
+        Returns
+        -------
+        ndarray or tuple
+            (): the readings have no test of their own.
+        """
+        return ()
 
     # ---- pipeline
 
@@ -502,6 +533,15 @@ def with_readings(job, readings):
 def given_methods(job):
     """Methods whose readings a `Job` contains."""
     return tuple(method for method in methods() if method.readings_of(job) is not None)
+
+
+def count_readings(job):
+    """Readings of the wall of a `Job` by kind and course: {kind: {course: count}}."""
+    return {
+        method.kind_of_readings: Counter(method.courses_of_readings(job))
+        for method in given_methods(job)
+        if method.kind_of_readings
+    }
 
 
 def supplement_of(job):

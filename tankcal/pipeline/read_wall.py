@@ -115,3 +115,9 @@ class ReadWall:
     def are(self, kind):
         """Mask (n,) of the readings of a kind."""
         return np.array([reading.of == kind for reading in self.readings], dtype=bool)
+
+
+def detectable_m(wall, kind):
+    """Minimal detectable bias of the readings of a kind, m; () for a wall without such tests."""
+    read = wall if isinstance(wall, ReadWall) else getattr(wall, "read", None)
+    return () if read is None else read.tests_of(kind)[1]

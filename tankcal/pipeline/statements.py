@@ -252,7 +252,17 @@ def verdict_of(job, body, table, intervals, simulation):
     if job.rule is None:
         return None
     printed = _printed(intervals, simulation)
-    return judge(job.rule, table, _tank(job, body), stated=_stated(job), printed=printed)
+    return judge(
+        job.rule,
+        table,
+        _tank(job, body),
+        stated=tuple(
+            StatedVolume(stated_delivery.volume_m3, stated_delivery.high_m, stated_delivery.low_m)
+            for stated_delivery in job.stated
+            if stated_delivery.volume_m3 is not None
+        ),
+        printed=printed,
+    )
 
 
 def _printed(intervals, simulation):
@@ -345,15 +355,6 @@ def _quarters(table):
     dips_m = np.array(QUARTERS) * table.height_m[-1]
     rows = np.argmin(np.abs(table.height_m[:, None] - dips_m), axis=0)
     return table.height_m[np.unique(rows)].tolist()
-
-
-def _stated(job):
-    """Volumes stated by an earlier table or a contract."""
-    return tuple(
-        StatedVolume(stated_delivery.volume_m3, stated_delivery.high_m, stated_delivery.low_m)
-        for stated_delivery in job.stated
-        if stated_delivery.volume_m3 is not None
-    )
 
 
 def _tank(job, body):

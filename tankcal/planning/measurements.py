@@ -162,7 +162,12 @@ def draw_measurements(plan, measurements, network, rng=None):
         share errors of its scale and offset.
     """
     values, draw = _nominal_values(network), _error_function(rng)
-    off = {tool.name: _instrument_errors(tool, draw) for tool in measurements.instruments}
+    off = {
+        tool.name: tuple(
+            float(draw(0.0, np.nan_to_num(u))) for u in (tool.u_scale, tool.u_offset_m)
+        )
+        for tool in measurements.instruments
+    }
     tools = {tool.name: tool for tool in measurements.instruments}
     setups = {setup.name: setup for setup in measurements.setups}
     images, control = measurements.image_points, measurements.control
@@ -218,11 +223,6 @@ def _fill_values(readings, values, draw, tools, setups):
     elif readings.table == "plumb_lines":
         return readings
     return replace(readings, value=draw(value, readings.sd))
-
-
-def _instrument_errors(tool, draw):
-    """Error (scale, offset m) of an instrument; 0 for a quantity without a prior."""
-    return tuple(float(draw(0.0, np.nan_to_num(u))) for u in (tool.u_scale, tool.u_offset_m))
 
 
 def _instrument_reading(true_m, name, tools, off):

@@ -258,7 +258,12 @@ def plain_parameters(result):
         ),
         without=[_trial(result, trial) for trial in result.trials],
         with_all=result.base and WithAll(result.base[1], *_volume(result.base[0])),
-        rules=PublishedRules(_silva(result.silva), _pessoa(result.pessoa)),
+        rules=PublishedRules(
+            _silva(result.silva),
+            fill_from(
+                PessoasRule, result.pessoa, keep=[KeptBecause(*kept) for kept in result.pessoa.keep]
+            ),
+        ),
     )
     return to_plain(file)
 
@@ -334,7 +339,3 @@ def _silva(rule):
         for number, share, high in rule.high
     ]
     return fill_from(SilvasRule, rule, components=components)
-
-
-def _pessoa(rule):
-    return fill_from(PessoasRule, rule, keep=[KeptBecause(*kept) for kept in rule.keep])

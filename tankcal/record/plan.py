@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from tankcal.methods.base import count_readings
 from tankcal.planning.places import group_by_ends
 from tankcal.planning.prediction import PointOutlook, SectionOutlook
 from tankcal.planning.reliability import GroupReliability
@@ -280,17 +281,18 @@ def plain_of_wall(prediction, simulated=None, job=()):
 
 def survey_of(plan):
     """Return the `PlannedWall` of a WallPlan."""
-    design, job, count = plan.design, plan.job, wall_count(plan)
+    design, count = plan.design, wall_count(plan)
+    read = {kind: by_course.total() for kind, by_course in count_readings(plan.job).items()}
     return PlannedWall(
         circumferences=len({strap.name for strap in design.straps}),
-        strap_readings=0 if job.strapping is None else len(job.strapping.straps),
+        strap_readings=read.get("straps", 0),
         lines=count["line"],
         faces=0 if design.lines is None else design.lines.faces,
-        offsets=0 if job.lines is None else len(job.lines.offsets),
+        offsets=read.get("offsets", 0),
         setups=count["setup"],
-        hits=0 if job.hits is None else len(job.hits),
+        hits=read.get("hits", 0),
         shared_targets=0 if design.ties is None else design.ties[0],
-        tangents=0 if job.tangents is None else len(job.tangents),
+        tangents=read.get("tangents", 0),
         runs=count["run"],
         batches=count["batch"],
     )

@@ -72,13 +72,9 @@ def beside(folder, described):
     return [
         Attachment(path.name, *KINDS[path.suffix], described[path.name], sha256(path.read_bytes()))
         for path in paths
-        if path.is_file() and path.stat().st_size <= _largest(path)
+        if path.is_file()
+        and path.stat().st_size <= (LARGEST_PACKED if path.suffix == ".npz" else LARGEST)
     ]
-
-
-def _largest(path):
-    """Largest size of an embedded file, bytes."""
-    return LARGEST_PACKED if path.suffix == ".npz" else LARGEST
 
 
 def contents(blocks, folder):
@@ -189,13 +185,9 @@ def named(blocks):
         {
             attachment["name"]: attachment
             for block in documents
-            for attachment in _attachments(block)
+            for attachment in block.get("attachments", [])
         }.values()
     )
-
-
-def _attachments(document):
-    return document.get("attachments", [])
 
 
 def sha256(data):

@@ -49,7 +49,7 @@ def _upright(paper):
     tank = record["job"]["tank"]
     shape = tank["nominal_height_m"] / tank["nominal_diameter_m"] * (_RIGHT - _LEFT)
     height = max(_LEAST_HEIGHT, min(_MOST_HEIGHT, shape), _OF_COURSE * len(courses))
-    head_m = _head_m(record)
+    head_m = {size["code"]: size["value"] for size in record.get("top") or ()}.get("top_depth", 0.0)
     per_m = height / (courses[-1]["top_m"] + head_m)
     rise = per_m * _rise_m(record)
     below = max(-rise, 0.0)
@@ -77,11 +77,6 @@ def _rise_m(record):
     """Height of the centre of a shaped bottom above its edge, where the courses begin, m."""
     sizes = {size["code"]: size["value"] for size in record["bottom"] or ()}
     return -sizes.get("bottom_depth", 0.0)
-
-
-def _head_m(record):
-    """Height of a head on top above the shell, m; 0 without a head."""
-    return {size["code"]: size["value"] for size in record.get("top") or ()}.get("top_depth", 0.0)
 
 
 def _closed_top(ax, y, rise, details):

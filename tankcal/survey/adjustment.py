@@ -130,7 +130,13 @@ def _adjust(measurements, progress, snooping=None, most=100, like=None):
     if swapped:
         raise SolutionError("\n".join(map(str, swapped)))
     frame = make_frame(survey, gathered, measurements.settings)
-    progress(message("adjusting", "adjusting {count} observations", count=_count(frame.survey)))
+    progress(
+        message(
+            "adjusting",
+            "adjusting {count} observations",
+            count=sum(len(table) * table.rows for table in frame.survey.tables.values()),
+        )
+    )
     is_snooping = measurements.settings.snooping if snooping is None else snooping
     gross = gross_readings(frame.survey) if is_snooping else None
     options = {**frame.options, "max_iterations": most}
@@ -154,11 +160,6 @@ def _why_not(measurements, message):
         or likely_mistake(measurements, np.inf, _adjust_trial, message)
         or wrong_control(measurements, np.inf, _adjust_trial)[0]
     )
-
-
-def _count(survey):
-    """Number of values observed in a survey."""
-    return sum(len(table) * table.rows for table in survey.tables.values())
 
 
 def _complete(search, gathered, frame, measurements):

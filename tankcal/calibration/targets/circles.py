@@ -61,7 +61,10 @@ def read_circles(image, smallest_px=6.0, largest_px=None):
         item = _measure_circle(image, start, smallest_px)
         if isinstance(item, RefusedTarget):
             refused.append(item)
-        elif not any(_is_same(item, other) for other in kept):
+        elif not any(
+            (np.hypot(*(item.centre_px - other.centre_px)) < 0.5 * other.semi_axes_px[1])
+            for other in kept
+        ):
             kept.append(item)
     refused = [
         item
@@ -72,10 +75,6 @@ def read_circles(image, smallest_px=6.0, largest_px=None):
     ]
     kept.sort(key=lambda item: tuple(item.centre_px[::-1]))
     return PhotoTargets(tuple(kept), tuple(refused), image.shape[::-1])
-
-
-def _is_same(circle, other):
-    return np.hypot(*(circle.centre_px - other.centre_px)) < 0.5 * other.semi_axes_px[1]
 
 
 def _propose_ellipses(image, smallest, largest):

@@ -124,7 +124,10 @@ def decide_wall(cells, joints_m, sides):
     -------
     CloudWall
     """
-    joints_m, column_m = np.asarray(joints_m, dtype=float), _column_widths(cells)
+    joints_m, column_m = (
+        np.asarray(joints_m, dtype=float),
+        FULL_TURN * cells.surface.width_m(cells.grid.middles_m) / cells.grid.columns,
+    )
     wall_values = _ScanValues(cells)
     side_walls = {}
     for side in dict.fromkeys(sides):
@@ -333,11 +336,6 @@ def _mean_distances(counts, low, high, grid):
     part = np.where((number >= low[..., None]) & (number <= high[..., None]), counts, 0)
     with np.errstate(invalid="ignore", divide="ignore"):
         return (part @ number / part.sum(axis=2) + 0.5) * grid.bin_m - grid.band_m
-
-
-def _column_widths(cells):
-    """Width of a cell in each row (rows,), m."""
-    return FULL_TURN * cells.surface.width_m(cells.grid.middles_m) / cells.grid.columns
 
 
 def _average_distances(cells, scan, side_wall):

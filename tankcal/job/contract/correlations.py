@@ -59,7 +59,9 @@ def check_correlations(table, inputs, raw, log):
             log.problem(table.file, expected, row, "with")
         first_row.setdefault(pair, row)
         pairs[first, second] = r
-    if len(log.problems) == before and not (table.skipped or None in _flat(pairs)):
+    if len(log.problems) == before and not (
+        table.skipped or None in [*(name for pair in pairs for name in pair), *pairs.values()]
+    ):
         _check_together(table, pairs, log)
 
 
@@ -70,11 +72,6 @@ def _declared(inputs, raw):
         return None if is_there else ()
     names = inputs.of("input")
     return None if inputs.skipped or None in names else names
-
-
-def _flat(pairs):
-    """Return the names and coefficients of all pairs in a list."""
-    return [*(name for pair in pairs for name in pair), *pairs.values()]
 
 
 def _check_together(table, pairs, log):

@@ -124,7 +124,7 @@ def _identify_item(table, row, point, reading_table, reading_row, log):
         return None
     if point is not None:
         return None, point
-    is_reported = _has_problem(table, row, log)
+    is_reported = any((problem.file, problem.row) == (table.file, row) for problem in log.problems)
     if reading_table is None and reading_row is None and not is_reported:
         expected = message("overruled_nothing", "blank; expected a point, or a table and its row")
         log.problem(table.file, expected, row, "point")
@@ -244,11 +244,6 @@ def _is_correlated(pairs, reading_table, reading_row):
         return False
     ends = (zip(pairs.of(f"table_{i}"), pairs.of(f"row_{i}"), strict=True) for i in "12")
     return any((reading_table, reading_row) in end for end in ends)
-
-
-def _has_problem(table, row, log):
-    """Determine whether a problem of that row has already been reported."""
-    return any((problem.file, problem.row) == (table.file, row) for problem in log.problems)
 
 
 def _tables_without_names():

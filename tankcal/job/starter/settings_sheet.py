@@ -114,13 +114,9 @@ def _write_start(sheet, row, field, start, cell):
 def _write_example(sheet, row, example, look):
     if isinstance(example, float):
         sheet.write_number(row, _EXAMPLE, example, look.example(align="left"))
-    elif example is not None and _is_day(example):
+    elif example is not None and (len(example) == 10 and example[4] == example[7] == "-"):
         day = datetime.date.fromisoformat(example)
         grey = look.example(align="left", num_format="yyyy-mm-dd")
         sheet.write_datetime(row, _EXAMPLE, day, grey)
     elif example is not None:
         sheet.write_string(row, _EXAMPLE, example, look.example(align="left"))
-
-
-def _is_day(text):
-    return len(text) == 10 and text[4] == text[7] == "-"

@@ -54,7 +54,11 @@ def _condition(field, choices, cell, texts):
         return {"validate": "list", "source": [texts.choice(YES), texts.choice(NO)]}
     if field.kind == "choice":
         listed = [texts.choice(choice) for choice in choices]
-        return {"validate": "list", "source": listed} if _fits(listed) else None
+        return (
+            {"validate": "list", "source": listed}
+            if (len(",".join(listed)) <= LONGEST_LIST)
+            else None
+        )
     if field.kind == "number":
         return _of_number(field, cell)
     if field.kind == "date":
@@ -67,10 +71,6 @@ def _condition(field, choices, cell, texts):
     if field.kind in _LENGTHS:
         return {"validate": "length", "criteria": "<=", "value": _LENGTHS[field.kind]}
     return None
-
-
-def _fits(listed):
-    return len(",".join(listed)) <= LONGEST_LIST
 
 
 def _of_number(field, cell):

@@ -308,7 +308,10 @@ def _make_empty(directory, replaceable=None):
     paths = sorted(directory.iterdir()) if directory.exists() else []
     of_form = [path for path in paths if path.name not in KEPT]
     written = replaceable() if of_form and replaceable else {}
-    if (paths and not written) or not all(_is_untouched(path, written) for path in of_form):
+    if (paths and not written) or not all(
+        (path.name in written and path.is_file() and path.read_bytes() == written[path.name])
+        for path in of_form
+    ):
         text = message(
             "new_not_empty",
             "is not empty, and is left as it is; expected the name of a new or empty folder",
@@ -316,10 +319,6 @@ def _make_empty(directory, replaceable=None):
         raise InputError(Problem(directory.name, text))
     directory.mkdir(parents=True, exist_ok=True)
     return of_form
-
-
-def _is_untouched(path, written):
-    return path.name in written and path.is_file() and path.read_bytes() == written[path.name]
 
 
 def _remove(paths):

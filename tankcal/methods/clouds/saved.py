@@ -216,7 +216,18 @@ def save_clouds(result):
         files=_files(clouds, clouded),
         scans=_scans(result),
         scanners=[_scanner(name, *declaration) for name, declaration in clouds.tools.items()],
-        targets=[_target(residual) for residual in registration.residuals],
+        targets=[
+            ScanTargetUsed(
+                scan=residual.scan,
+                target=residual.target,
+                residual_m=residual.residual_m.tolist(),
+                w=residual.w if np.isfinite(residual.w) else None,
+                mdb_m=residual.mdb_m if np.isfinite(residual.mdb_m) else None,
+                removed=residual.removed,
+                row=residual.row,
+            )
+            for residual in registration.residuals
+        ],
         registration_dof=registration.dof,
         registration_chi2=registration.chi2,
         overlaps=[
@@ -235,7 +246,14 @@ def save_clouds(result):
             for index, share in enumerate(cells.masked_share)
         ],
         obstructions=[_obstruction(obstruction, zero_m) for obstruction in cells.obstructions],
-        joints=[_joint(joint, zero_m) for joint in cells.joints],
+        joints=[
+            JointSeen(
+                height_m=joint.height_m - zero_m,
+                step_mm=1000 * joint.step_m,
+                nearest_m=joint.nearest_m - zero_m if np.isfinite(joint.nearest_m) else None,
+            )
+            for joint in cells.joints
+        ],
         welds=[
             WeldSeen(
                 course=_course_name(result.job, weld.course),
@@ -324,18 +342,6 @@ def _scanner(name, tool, offset_is_assumed, scale_is_assumed):
     )
 
 
-def _target(residual):
-    return ScanTargetUsed(
-        scan=residual.scan,
-        target=residual.target,
-        residual_m=residual.residual_m.tolist(),
-        w=residual.w if np.isfinite(residual.w) else None,
-        mdb_m=residual.mdb_m if np.isfinite(residual.mdb_m) else None,
-        removed=residual.removed,
-        row=residual.row,
-    )
-
-
 def _course_name(job, index):
     """Name of a course; a tank without courses has numbered parts."""
     return job.courses[index].name if index < len(job.courses) else str(index + 1)
@@ -363,14 +369,6 @@ def _zero_m(result):
     if kind != "vertical":
         return 0.0
     return (result.job.datum.bottom_z_m or 0.0) + result.zero_m
-
-
-def _joint(joint, zero_m):
-    return JointSeen(
-        height_m=joint.height_m - zero_m,
-        step_mm=1000 * joint.step_m,
-        nearest_m=joint.nearest_m - zero_m if np.isfinite(joint.nearest_m) else None,
-    )
 
 
 def shared_part_of(table):

@@ -20,17 +20,15 @@ def check_circles(job, sphere):
     strapping = job.surveys["great_circles"].strapping
     of_straps = (*tape_warnings.check_tapes(job, sphere, strapping), *check_repeats(sphere))
     return (
-        *(_assign_to_circles(problem) for problem in of_straps),
+        *(
+            (replace(problem, file=FILE) if problem.file == tape_warnings.FILE else problem)
+            for problem in of_straps
+        ),
         *_check_equator(sphere),
         *_check_meridians(sphere),
         *_check_nominal_radius(job, sphere),
         *_check_outliers(sphere),
     )
-
-
-def _assign_to_circles(problem):
-    """Assign a problem of tape readings to the file of great circles."""
-    return replace(problem, file=FILE) if problem.file == tape_warnings.FILE else problem
 
 
 def _check_equator(sphere):

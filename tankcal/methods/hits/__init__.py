@@ -21,6 +21,7 @@ class HitsMethod(Method):
     has_own_offset = True
     compares_size = True
     field_forms = ((("wall_hits",), 30), (("control_readings",), 24))
+    kind_of_readings = "hits"
     saved_note = "bare wall hits; left out where there are none"
 
     # ---- job
@@ -71,6 +72,12 @@ class HitsMethod(Method):
         from tankcal.methods.hits.observed import levels_of_hits
 
         return set(levels_of_hits(job))
+
+    def courses_of_readings(self, job):
+        return job.hits.course
+
+    def instruments_in_use(self, job):
+        return set(job.hits.instrument)
 
     # ---- pipeline
 

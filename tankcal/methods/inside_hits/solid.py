@@ -77,7 +77,7 @@ def find_hit_solid(job, adjustment, progress, dof=np.inf):
     fit, used_hits = _first_fit(job, sighting, np.flatnonzero(~hits.check))
     for _ in range(ROUNDS):
         sighting = sight(hits, poses, incidence=partial(incidence_on, fit))
-        job_of_points = _with_points(job, sighting, used_hits)
+        job_of_points = replace(job, points=s_transform(take_points(sighting.points, used_hits)))
         scan = fit_scan(job_of_points, dof)
         change_m = scan.residuals_m - offsets(fit, job_of_points.points.xyz_m)
         fit = scan.fit
@@ -180,11 +180,6 @@ def _first_fit(job, sighting, adjusted):
     # The bound of `fit_scan` for a point of the wall: a deep dent, but no fitting.
     is_near = np.abs(offsets(fit, points.xyz_m)) <= NEVER_PART * fit.radius_m + NEVER_M
     return fit, adjusted[is_near | (decisions_of(job) != 0)]
-
-
-def _with_points(job, sighting, used_hits):
-    """The job with selected hits as points, without their common motion in the covariance."""
-    return replace(job, points=s_transform(take_points(sighting.points, used_hits)))
 
 
 def _refuse_unknown_offset(sighting):

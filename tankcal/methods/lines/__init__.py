@@ -19,6 +19,7 @@ class LinesMethod(Method):
     tables_with_sds = ("offsets",)
     accompanies_points = True
     field_forms = ((("lines",), 12), (("offsets",), 30))
+    kind_of_readings = "offsets"
     csv_files = ("offsets.csv",)
     saved_note = "reference lines; left out if there are none"
 
@@ -74,6 +75,17 @@ class LinesMethod(Method):
 
     def levels_read(self, job):
         return {(offset.course, offset.level_m) for offset in job.lines.offsets}
+
+    def courses_of_readings(self, job):
+        return [offset.course for offset in job.lines.offsets]
+
+    def instruments_in_use(self, job):
+        return {line.instrument for line in job.lines.lines.values()}
+
+    def detectable_m(self, job, wall, sights):
+        from tankcal.pipeline.read_wall import detectable_m
+
+        return detectable_m(wall, "offsets")
 
     # ---- pipeline
 

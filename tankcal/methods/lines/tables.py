@@ -105,7 +105,10 @@ def offsets_by_level(paper):
     """
     record = paper.record["lines"]
     names = [line["line"] for line in record["lines"]]
-    decimals = _decimals([1000 * offset["offset_m"] for offset in record["offsets"]])
+    decimals = 1 + any(
+        abs(value - round(value, 1)) > 1e-6
+        for value in [1000 * offset["offset_m"] for offset in record["offsets"]]
+    )
     readings = _group_by_place(record["offsets"])
     tables = []
     across = max(1, min(ACROSS, LETTERS // max(map(len, names))))
@@ -154,8 +157,3 @@ def _cell(paper, offset, decimals):
         return None
     text = paper.number(1000 * offset["offset_m"], decimals=decimals)
     return MARKS[offset["state"]].format(text)
-
-
-def _decimals(values_mm):
-    """Return the number of decimals of the readings, 1 or 2."""
-    return 1 + any(abs(value - round(value, 1)) > 1e-6 for value in values_mm)

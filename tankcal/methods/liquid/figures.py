@@ -33,15 +33,12 @@ def facts(paper):
             ("liquid_flex", _estimate(paper, liquid, "bottom_flex", "L/m")),
             ("liquid_test", _test(paper, liquid)),
             ("liquid_radius", paper.number(liquid["detectable_radius_m"], "mm", digits=2)),
-            ("liquid_hidden", _hidden(paper, liquid)),
+            (
+                "liquid_hidden",
+                " ".join(control_text(paper, control) for control in liquid.get("controls") or ())
+                or None,
+            ),
         ]
-    )
-
-
-def _hidden(paper, liquid):
-    """Return the sizes of undetected errors in words; None for records of earlier versions."""
-    return (
-        " ".join(control_text(paper, control) for control in liquid.get("controls") or ()) or None
     )
 
 

@@ -26,6 +26,7 @@ class StrappingMethod(Method):
         (("thickness",), 8),
         (("tape_checks",), 4),
     )
+    kind_of_readings = "straps"
     csv_files = ("strapping.csv",)
     saved_note = "circumferences by tape; left out if there are none"
 
@@ -97,6 +98,18 @@ class StrappingMethod(Method):
 
     def levels_read(self, job):
         return {(strap.course, strap.level_m) for strap in job.strapping.straps}
+
+    def courses_of_readings(self, job):
+        return [strap.course for strap in job.strapping.straps]
+
+    def instruments_in_use(self, job):
+        read = {strap.tape for strap in job.strapping.straps}
+        return read | {tape.master for tape in job.strapping.tapes if tape.name in read}
+
+    def detectable_m(self, job, wall, sights):
+        from tankcal.pipeline.read_wall import detectable_m
+
+        return detectable_m(wall, "straps")
 
     # ---- pipeline
 

@@ -22,6 +22,7 @@ class TangentsMethod(Method):
     is_smooth = True
     compares_size = True
     field_forms = ((("tangents",), 30),)
+    kind_of_readings = "tangents"
     saved_note = "tangents from outside; left out where there are none"
 
     # ---- job
@@ -68,6 +69,17 @@ class TangentsMethod(Method):
     def levels_read(self, job):
         tangents = job.tangents
         return set(zip(tangents.course, tangents.level_m.tolist(), strict=True))
+
+    def courses_of_readings(self, job):
+        return job.tangents.course
+
+    def instruments_in_use(self, job):
+        return set(job.tangents.instrument)
+
+    def detectable_m(self, job, wall, sights):
+        from tankcal.pipeline.checks.tangents import judge_tangents
+
+        return judge_tangents(job, wall, sights).mdb_m[~job.tangents.check]
 
     # ---- pipeline
 

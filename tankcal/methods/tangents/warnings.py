@@ -168,7 +168,9 @@ def _check_heights(job, touching):
             off=float(np.median(off_m[places])),
             other=other_course,
         )
-        yield Problem(tangents.file, text, _row(tangents, places[0]), "level_m")
+        yield Problem(
+            tangents.file, text, tangents.rows[places[0]] if tangents.rows else None, "level_m"
+        )
 
 
 def _high_setups(setup, off_m, most_m):
@@ -199,10 +201,6 @@ def _high_setups(setup, off_m, most_m):
         ):
             off_by_setup[str(name)] = median_m
     return off_by_setup if 2 * len(off_by_setup) < len(names) else {}
-
-
-def _row(tangents, place):
-    return tangents.rows[place] if tangents.rows else None
 
 
 def _check_setups(job, tests):

@@ -185,7 +185,16 @@ def warn_of_vague_points(points, accepted, sds_m, noise_m):
                 times=VAGUE,
                 median_mm=1000 * median_m,
                 points=list_some(
-                    [_with_sd(points.names[accepted[i]], sds_of_wall[i]) for i in worst], SHOWN
+                    [
+                        message(
+                            "with_sd",
+                            "{name} ({sd_mm:.1f} mm)",
+                            name=points.names[accepted[i]],
+                            sd_mm=1000 * sds_of_wall[i],
+                        )
+                        for i in worst
+                    ],
+                    SHOWN,
                 ),
             )
         )
@@ -200,10 +209,6 @@ def warn_of_vague_points(points, accepted, sds_m, noise_m):
             )
         )
     return of_points(points, texts)
-
-
-def _with_sd(name, sd_m):
-    return message("with_sd", "{name} ({sd_mm:.1f} mm)", name=name, sd_mm=1000 * sd_m)
 
 
 def warn_of_undeclared(undeclared):

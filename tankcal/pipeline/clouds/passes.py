@@ -69,7 +69,10 @@ class Placing:
     @classmethod
     def of(cls, clouds, registration):
         """Return the `Placing` of the clouds of a job and the `Registration` of their scans."""
-        files = tuple(replace(file, header=_absolute_header(file.header)) for file in clouds.files)
+        files = tuple(
+            replace(file, header=replace(file.header, path=file.header.path.absolute()))
+            for file in clouds.files
+        )
         places = registration.rotation, registration.place_m
         return cls(files, clouds.scans, clouds.ranging, *places)
 
@@ -256,11 +259,6 @@ class Telling:
         if self._part is not None and now - self._told >= TOLD_EVERY_S:
             self._told = now
             self._part(self._text, int(read), int(max(read, about)))
-
-
-def _absolute_header(header):
-    """Header with the absolute path of its file: the working directory of a worker may differ."""
-    return replace(header, path=header.path.absolute())
 
 
 def _points_in(header, piece, about):

@@ -57,7 +57,7 @@ def coordinates(sources):
             distributions += [_distribution(part) for part in source.parts]
             slopes += list(columns)
             continue
-        if not _has_own(source):
+        if not (source.u is not None or source.distribution not in ("normal", "t")):
             squares = np.sum(columns**2, axis=0)
             if np.isinf(source.dof):
                 normal_squares = normal_squares + squares
@@ -73,11 +73,6 @@ def coordinates(sources):
     rows = len(sources[0].columns_m3) if sources else 0
     stacked = np.stack(slopes, axis=1) if slopes else np.empty((rows, 0))
     return Coordinates(tuple(distributions), stacked, place)
-
-
-def _has_own(source):
-    """Whether each column of a source is a coordinate: a declared input, or not normal."""
-    return source.u is not None or source.distribution not in ("normal", "t")
 
 
 def _distribution(source):

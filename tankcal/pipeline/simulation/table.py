@@ -90,7 +90,10 @@ def simulate_table(job, survey, body, zero_m, table, pairs=(), *, goal=None, pro
     low, high = np.array(pairs, dtype=float).reshape(-1, 2).T
     model = Model(job, survey, body, zero_m, table, table.weights(high) - table.weights(low))
     simulation, drawn = model.simulated(goal, report)
-    rows, of_deliveries = (_part(simulation, part) for part in model.parts)
+    rows, of_deliveries = (
+        replace(simulation, **{name: values[part] for name, values in simulation.by_volume.items()})
+        for part in model.parts
+    )
     delivered = deliveries(table, low, high)
     of_delivered = delivered.volume_m3, delivered.u_m3, delivered.dof
     return TableSimulation(
@@ -104,10 +107,4 @@ def simulate_table(job, survey, body, zero_m, table, pairs=(), *, goal=None, pro
         drawn=drawn,
         seed=goal.seed,
         digits=goal.digits,
-    )
-
-
-def _part(simulation, part):
-    return replace(
-        simulation, **{name: values[part] for name, values in simulation.by_volume.items()}
     )

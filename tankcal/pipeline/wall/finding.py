@@ -207,7 +207,9 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
         straps=straps,
         read=read,
         by_inputs=by_inputs,
-        without_inputs=("offset",) if _has_own_offsets(job) else (),
+        without_inputs=("offset",)
+        if any(method.has_own_offset for method in given_methods(job))
+        else (),
         origins_m=np.array([sample.centre_m for sample in samples]),
         told=told,
     )
@@ -220,11 +222,6 @@ def is_smoothed(job):
     see.
     """
     return _is_smooth(job) or has_loose_poses(job)
-
-
-def _has_own_offsets(job):
-    """Whether the instruments of the wall have offsets of their own, as of hits and clouds."""
-    return any(method.has_own_offset for method in given_methods(job))
 
 
 def _is_smooth(job):

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from tankcal.methods.base import count_readings, given_methods
 from tankcal.planning.wall.checks import least_ring_m
 from tankcal.planning.wall.filling import LEAST_STEP_M, SAME_M
 from tankcal.planning.wall.model import USUAL_AT, PlannedStrap, even_radius_m
@@ -40,18 +41,12 @@ def wall_changes_of(plan):
 def wall_count(plan):
     """Return {item: number of items in a WallPlan} of the items that have a cost."""
     design, job, ring = plan.design, plan.job, plan.design.tangents
-    read = (
-        job.strapping and job.strapping.straps,
-        job.lines and job.lines.offsets,
-        job.hits,
-        job.tangents,
-    )
     return {
         "strap": len(design.straps),
         "line": 0 if job.lines is None else len(job.lines.lines),
         "setup": sum(hit.setups for hit in design.hits) + (0 if ring is None else ring.stations),
         "base": 0 if ring is None or ring.bar is None else 2 * ring.stations,
-        "reading": sum(len(course) for course in read if course is not None),
+        "reading": sum(by_course.total() for by_course in count_readings(job).values()),
         "run": len(design.runs),
         "batch": sum(run.batches for run in design.runs),
     }
@@ -223,15 +218,7 @@ def _halve(entry, keys):
 
 def instruments_in_use(job):
     """Names of the instruments that a Job uses, and of the masters of its tapes."""
-    names = set()
-    if job.strapping is not None:
-        read = {strap.tape for strap in job.strapping.straps}
-        names |= read | {tape.master for tape in job.strapping.tapes if tape.name in read}
-    if job.lines is not None:
-        names |= {line.instrument for line in job.lines.lines.values()}
-    for sighted in (job.hits, job.tangents):
-        if sighted is not None:
-            names |= set(sighted.instrument)
+    names = set().union(*(method.instruments_in_use(job) for method in given_methods(job)))
     for readings in () if job.measurements is None else job.measurements.readings:
         names |= set(readings.instrument or ())
     return names - {"", None}

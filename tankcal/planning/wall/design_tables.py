@@ -61,25 +61,32 @@ class DesignTables:
 
     def tables(self):
         """Return {name: Table}, with decimal points."""
-        tables = {}
-        if self.design.straps:
-            tables["circumferences"] = self._straps(), MOST_STRAPS
-        if self.design.lines is not None:
-            tables["lines"] = self._lines(), MOST_OFFSETS
-            tables["offsets"] = self._offsets(), MOST_OFFSETS
-        if self.design.hits:
-            tables["wall_hits"] = self._hits(), MOST_HITS
-            tables["setups"] = self._setups(), MOST_HITS
-            tables["control"] = self._stations(), MOST_HITS
-            tables["control_readings"] = self._control_readings(), MOST_HITS
-            if self.design.ties is not None:
-                tables |= {name: (rows, MOST_HITS) for name, rows in self._ties().items()}
-        if self.design.tangents is not None:
-            tables["tangents"] = self._tangents(), MOST_TANGENTS
-            tables |= {name: (rows, MOST_TANGENTS) for name, rows in self._traverse().items()}
-        if self.design.runs:
-            tables["liquid"] = rows_of_runs(self.design.runs, self.volume_at), MOST_ROWS
-        return {name: _table(name, islice(rows, most + 1)) for name, (rows, most) in tables.items()}
+        parts = {  # part of the design: its tables, and the most rows of each
+            "straps": (lambda: {"circumferences": self._straps()}, MOST_STRAPS),
+            "lines": (lambda: {"lines": self._lines(), "offsets": self._offsets()}, MOST_OFFSETS),
+            "hits": (self._tables_of_hits, MOST_HITS),
+            "tangents": (lambda: {"tangents": self._tangents()} | self._traverse(), MOST_TANGENTS),
+            "runs": (
+                lambda: {"liquid": rows_of_runs(self.design.runs, self.volume_at)},
+                MOST_ROWS,
+            ),
+        }
+        return {
+            name: _table(name, islice(rows, most + 1))
+            for part, (make_tables, most) in parts.items()
+            if getattr(self.design, part)
+            for name, rows in make_tables().items()
+        }
+
+    def _tables_of_hits(self):
+        """Return {table: rows} of the hits, their set-ups and targets."""
+        tables = {
+            "wall_hits": self._hits(),
+            "setups": self._setups(),
+            "control": self._stations(),
+            "control_readings": self._control_readings(),
+        }
+        return tables if self.design.ties is None else tables | self._ties()
 
     def _height(self, course, percent):
         """Height above the bottom of a percentage of a course; nan for an unknown course."""

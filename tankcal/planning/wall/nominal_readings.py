@@ -132,8 +132,9 @@ def set_nominal_readings(job, amplitudes, expected_run=None):
         Relative sd of the run effect, if runs of liquid are to estimate it.
     """
     if job.tank.kind == "vertical":
-        if job.tangents is not None:
-            # Tangents are reduced with amplitudes of the precision that the readings would reach.
+        if any(method.is_smooth for method in given_methods(job)):
+            # Smooth readings, such as tangents, are reduced with amplitudes of the precision that
+            # the readings would reach.
             first = _set_nominal_wall(job, amplitudes)
             survey = find_survey(first, lambda text: None, amplitudes).survey
             amplitudes = expect_amplitudes(survey.field)

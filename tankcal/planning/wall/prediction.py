@@ -10,13 +10,11 @@ from tankcal.errors import InputError
 from tankcal.geometry.field.components import COMPONENTS
 from tankcal.geometry.field.estimate import LEVELS
 from tankcal.job.model import Job
-from tankcal.methods.base import supplement_of
+from tankcal.methods.base import count_readings, given_methods, supplement_of
 from tankcal.pipeline.checks.homogeneity import OF_SCATTER
-from tankcal.pipeline.checks.tangents import judge_tangents
 from tankcal.pipeline.liquid.measuring import Measured
 from tankcal.pipeline.liquid.nominal_wall import NominalWall
 from tankcal.pipeline.liquid.result import LiquidResult
-from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.statements import statements
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.table import ComputedTable, check_table, compute_table
@@ -41,6 +39,10 @@ OF_READINGS = (  # warnings that need real readings or a drawing; not predicted
     *("lines_of_inside", "many_offsets_set_aside", "setup_set_aside"),
     *OF_SCATTER,
 )
+
+
+# Kinds of readings in the order of CourseOutlook.
+READ_BY_COURSE = ("straps", "offsets", "hits", "tangents")
 
 
 @dataclass(frozen=True)
@@ -207,7 +209,8 @@ def predict_wall_table(job, amplitudes):
         return _wall_table(surveyed, surveyed.survey)
     field = surveyed.survey.field
     expected = expect_amplitudes(field)
-    if "tangents" in surveyed.sights:  # they estimate only the excess of the hull
+    # Smooth readings, such as tangents, estimate only the excess of the hull.
+    if any(method.is_smooth for method in given_methods(job)):
         surveyed = find_survey(job, lambda text: None, expected)
         field = surveyed.survey.field
     wall = replace(surveyed.survey, field=replace(field, amplitudes=expected))
@@ -238,32 +241,23 @@ def courses_of(result):
     noise = field.noise_m2 if isinstance(wall, TapedWall) else noise_of_wall(wall)
     sds = np.sqrt(np.diag(covariance) + np.einsum("ij,jk,ik->i", weights, noise, weights))
     names = [course.name for course in job.courses]
-    straps = Counter(
-        () if job.strapping is None else (strap.course for strap in job.strapping.straps)
-    )
-    offsets = Counter(() if job.lines is None else (offset.course for offset in job.lines.offsets))
-    hits = Counter(() if job.hits is None else job.hits.course)
-    tangents = Counter(() if job.tangents is None else job.tangents.course)
+    counts = {kind: Counter() for kind in READ_BY_COURSE} | count_readings(job)
     return tuple(
-        CourseOutlook(name, straps[name], offsets[name], hits[name], tangents[name], float(sd))
+        CourseOutlook(name, *(counts[kind][name] for kind in READ_BY_COURSE), float(sd))
         for name, sd in zip(names, sds, strict=True)
     )
 
 
 def readings_of(result):
-    """Return the ReadingsOutlook of straps, offsets and tangents, if any."""
-    wall = result.wall
-    if not isinstance(wall, ReadWall):
-        wall = wall and wall.read
-    kinds = () if wall is None or isinstance(wall, NominalWall) else ("straps", "offsets")
-    tested = [(kind, wall.tests_of(kind)[1]) for kind in kinds]
-    if result.job.tangents is not None:
-        tests = judge_tangents(result.job, result.wall, result.sighting)
-        tested.append(("tangents", tests.mdb_m[~result.job.tangents.check]))
+    """Return the ReadingsOutlook of each kind of tested readings."""
     outlooks = []
-    for kind, mdb_m in tested:
+    for method in given_methods(result.job):
+        mdb_m = method.detectable_m(result.job, result.wall, result.sighting)
         if len(mdb_m):
             known = mdb_m[np.isfinite(mdb_m)]  # the others are uncontrolled
             largest = float(known.max()) if len(known) else float("nan")
-            outlooks.append(ReadingsOutlook(kind, len(mdb_m), len(mdb_m) - len(known), largest))
+            count = len(mdb_m)
+            outlooks.append(
+                ReadingsOutlook(method.kind_of_readings, count, count - len(known), largest)
+            )
     return tuple(outlooks)

@@ -83,7 +83,20 @@ def design_of(plan_input, courses, celsius=None):
     return Design(
         straps=tuple(straps),
         lines=_lines(plan_input.sections["lines"]),
-        hits=tuple(_hits(entry, courses) for entry in plan_input.sections["hits"]),
+        hits=tuple(
+            PlannedHits(
+                setups=int(entry["setups"]),
+                radius_m=entry["radius_m"],
+                hits=int(entry["hits"]),
+                at_percent=percents_of(entry),
+                courses=entry["courses"] or courses,
+                start_deg=entry["start_azimuth_deg"] or 0.0,
+                height_m=USUAL_HEIGHT_M if entry["height_m"] is None else entry["height_m"],
+                spread_deg=entry["spread_deg"],
+                instrument=entry["instrument"],
+            )
+            for entry in plan_input.sections["hits"]
+        ),
         ties=(int(ties["targets"]), ties["s_mm"], ties["s_arcsec"]) if ties.filled_keys else None,
         control=_control(plan_input.sections["control_targets"]),
         tangents=_tangents(plan_input.sections["tangents"], plan_input.sections["traverse"]),
@@ -108,20 +121,6 @@ def _lines(entry):
         instrument=entry["instrument"],
         side=entry["side"] or "outside",
         first_deg=entry["first_azimuth_deg"] or 0.0,
-    )
-
-
-def _hits(entry, courses):
-    return PlannedHits(
-        setups=int(entry["setups"]),
-        radius_m=entry["radius_m"],
-        hits=int(entry["hits"]),
-        at_percent=percents_of(entry),
-        courses=entry["courses"] or courses,
-        start_deg=entry["start_azimuth_deg"] or 0.0,
-        height_m=USUAL_HEIGHT_M if entry["height_m"] is None else entry["height_m"],
-        spread_deg=entry["spread_deg"],
-        instrument=entry["instrument"],
     )
 
 

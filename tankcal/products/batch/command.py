@@ -138,7 +138,7 @@ def _batch(options):
             message(
                 "batch_stopped",
                 "stopped; finished jobs are kept; continue with: {command}",
-                command=_command(),
+                command=" ".join(["tankcal", *map(shlex.quote, sys.argv[1:])]),
             )
         )
         return signal_status(stop)
@@ -189,8 +189,3 @@ def _tell(batch, out):
         )
     )
     print_paths(Path(out), [path.name for path in batch.files])
-
-
-def _command():
-    """Return the command line for repetition."""
-    return " ".join(["tankcal", *map(shlex.quote, sys.argv[1:])])

@@ -397,7 +397,17 @@ def reduce_faces(shots, log):
         else:
             tally[str(shot.face)] += 1
             readings.append(Pointing(_convert_to_face_1(shot), str(shot.face)))
-    reports = {setup: _report(setup, tally) for setup, tally in errors.items()}
+    reports = {
+        setup: FaceReport(
+            setup,
+            len(tally["pairs"]),
+            (tally["1"], tally["2"]),
+            _spread([collimation for collimation, _ in tally["pairs"] if collimation is not None]),
+            _spread([index for _, index in tally["pairs"] if index is not None]),
+            tally["apart"],
+        )
+        for setup, tally in errors.items()
+    }
     return [_correct_single(reading, reports[reading.shot.setup]) for reading in readings], [
         *reports.values()
     ]
@@ -477,18 +487,6 @@ def _mean(first, second, tally, log):
         for key in ("direction_deg", "zenith_deg", "distance_m")
     }
     return replace(first, **(merged | means))
-
-
-def _report(setup, tally):
-    """Return the FaceReport of a set-up."""
-    return FaceReport(
-        setup,
-        len(tally["pairs"]),
-        (tally["1"], tally["2"]),
-        _spread([collimation for collimation, _ in tally["pairs"] if collimation is not None]),
-        _spread([index for _, index in tally["pairs"] if index is not None]),
-        tally["apart"],
-    )
 
 
 def _spread(values):

@@ -97,7 +97,14 @@ def inspect_files(asked, progress=None, part_progress=None) -> InspectionFile:
     basis = read_basis(asked.source, progress, part_progress)
     rule = rule or _rule_of_job(basis, log)
     if basis.is_older and files == (None, None):
-        log.problem(basis.file, _older_message())
+        log.problem(
+            basis.file,
+            message(
+                "inspect_older_record",
+                "a record of a version that did not keep the shape of its wall (radii by azimuth "
+                "and height with their covariance); expected its job, or the record of a new run",
+            ),
+        )
     log.stop_if_problems()
     strength = basis.strength
     if asked.yield_pa is not None:
@@ -189,7 +196,24 @@ def assemble_inspection(basis, rule, bottom=None, welds=None, *, nominal="drawin
         figures, generatrices, levels = inspect_shape(basis.shape, sizes, rule)
         problems += _warn_about_shape(basis, sizes, levels)
     if welds is not None:
-        figures += [_gap_figure(item, limit_of(rule, item.code)) for item in welds.figures]
+        figures += [
+            Figure(
+                code=item.code,
+                unit="mm",
+                value=item.value_mm,
+                U=item.U_mm,
+                k=item.k,
+                dof=np.inf,
+                limit=limit_of(rule, item.code),
+                course=item.course,
+                height_m=item.height_m,
+                azimuth_deg=item.azimuth_deg,
+                used=item.used,
+                remark=item.remark,
+                remark_values=item.remark_values,
+            )
+            for item in welds.figures
+        ]
     checks = [make_check(item) for item in (*figures, *bottom.figures)]  # in the order of CHECKS
     return InspectionFile(
         notice=basis.job["certificate"].get("notice") or "",
@@ -203,25 +227,6 @@ def assemble_inspection(basis, rule, bottom=None, welds=None, *, nominal="drawin
         settlements=list(bottom.settlements),
         edges=list(bottom.edges),
         warnings=[*(WarningRecord(**item) for item in basis.warnings), *warnings_of(problems)],
-    )
-
-
-def _gap_figure(gap, limit):
-    """`Figure` of a `weld_gaps.GapFigure`."""
-    return Figure(
-        code=gap.code,
-        unit="mm",
-        value=gap.value_mm,
-        U=gap.U_mm,
-        k=gap.k,
-        dof=np.inf,
-        limit=limit,
-        course=gap.course,
-        height_m=gap.height_m,
-        azimuth_deg=gap.azimuth_deg,
-        used=gap.used,
-        remark=gap.remark,
-        remark_values=gap.remark_values,
     )
 
 
@@ -301,15 +306,6 @@ def _warn_about_rejected(basis):
         **worst,
     )
     yield Problem(basis.file, text)
-
-
-def _older_message():
-    """Message that an older record cannot be inspected."""
-    return message(
-        "inspect_older_record",
-        "a record of a version that did not keep the shape of its wall (radii by azimuth and "
-        "height with their covariance); expected its job, or the record of a new run",
-    )
 
 
 def _older_warning(basis):

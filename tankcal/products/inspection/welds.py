@@ -74,16 +74,13 @@ def list_welds(course_heights_m, given_rad=(), detected=(), radius_m=np.inf):
         given = list((given_rad[course] or ()) if course < len(given_rad) else ())
         welds += [KnownWeld(PEAKING, course, low, high, float(weld)) for weld in given]
         for weld in detected:
-            if weld.course == course and _is_apart(weld.azimuth_rad, given, radius_m):
+            if weld.course == course and all(
+                abs(wrap_angle(weld.azimuth_rad - known)) * radius_m > APART_M for known in given
+            ):
                 at = float(weld.azimuth_rad)
                 welds.append(KnownWeld(PEAKING, course, low, high, at, LOOSE_M))
     rounds = [KnownWeld(BANDING, course, at, at) for course, at in enumerate(joints[1:-1])]
     return (*welds, *rounds)
-
-
-def _is_apart(azimuth, given, radius_m):
-    """Whether an azimuth differs from all given azimuths by more than APART_M along the shell."""
-    return all(abs(wrap_angle(azimuth - known)) * radius_m > APART_M for known in given)
 
 
 # Size of a cell: least and largest width across the weld, and length along the weld.

@@ -250,13 +250,14 @@ def split_words(line):
 
 def is_data(words):
     """Whether a line is a row of a table: at least two cells, most of them numbers."""
-    numbers = sum(_is_number(word.text) for word in words)
+    numbers = sum(
+        (
+            _NUMBER_CELL.fullmatch(word.text) is not None
+            or _FEET_CELL.fullmatch(word.text) is not None
+        )
+        for word in words
+    )
     return len(words) > 1 and numbers > _MOSTLY * len(words) and numbers > 1
-
-
-def _is_number(text):
-    """Whether a word is a number, or feet and inches."""
-    return _NUMBER_CELL.fullmatch(text) is not None or _FEET_CELL.fullmatch(text) is not None
 
 
 def _is_heading(words):

@@ -400,7 +400,11 @@ def join_heights(name, rows, places, headings):
     sizes = [heading.unit for heading in headings]
     if len(places) < 2 or None in sizes or not all(a >= b for a, b in pairwise(sizes)):
         return rows, None
-    body = [(row, cells) for row, cells in rows if _has_height(cells, places)]
+    body = [
+        (row, cells)
+        for row, cells in rows
+        if any(place < len(cells) and has_digit(cells[place]) for place in places)
+    ]
     columns = [_values([cells[k] if k < len(cells) else None for _, cells in body]) for k in places]
     columns[0] = _fill_down(columns[0])
     values = np.array([[np.nan if cell is None else float(cell) for cell in c] for c in columns])
@@ -425,11 +429,6 @@ def join_heights(name, rows, places, headings):
         else (row, cells)
         for row, cells in rows
     ), None
-
-
-def _has_height(cells, places):
-    """Whether one of the columns of heights has a number."""
-    return any(place < len(cells) and has_digit(cells[place]) for place in places)
 
 
 def _values(cells):

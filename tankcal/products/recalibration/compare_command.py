@@ -92,23 +92,21 @@ def _tell(comparison):
 
     paper = ComparisonPaper(comparison, language_of_run())
     warn(paper.warning(warning) for warning in comparison["warnings"][:MOST_WARNINGS])
-    say(_sides(comparison))
+    say(
+        message(
+            "compare_sides",
+            "{former} compared with {new}: {rows} rows from {low} to {high} m",
+            former=comparison["former"]["name"],
+            new=comparison["new"]["name"],
+            rows=len(comparison["rows"]["height_m"]),
+            low=_plain(comparison["low_m"]),
+            high=_plain(comparison["high_m"]),
+        )
+    )
     say(_sum(comparison["waterfall"][-1]))
     say(_verdict(comparison, paper))
     for reason in comparison["reasons"]:
         say(f"  {paper.reason(reason)}")
-
-
-def _sides(comparison):
-    return message(
-        "compare_sides",
-        "{former} compared with {new}: {rows} rows from {low} to {high} m",
-        former=comparison["former"]["name"],
-        new=comparison["new"]["name"],
-        rows=len(comparison["rows"]["height_m"]),
-        low=_plain(comparison["low_m"]),
-        high=_plain(comparison["high_m"]),
-    )
 
 
 def _sum(column):

@@ -136,7 +136,18 @@ def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
         interpolation_m3=basis.interpolation_m3,
         steps=basis.basis_steps,
         zero=basis.zero,
-        rows=_rows(basis, agreement),
+        rows=ComparedRows(
+            height_m=basis.height_m,
+            former_m3=basis.former_m3,
+            former_on_basis_m3=basis.on_basis_m3,
+            new_m3=basis.new_m3,
+            d_m3=basis.new_m3 - basis.on_basis_m3,
+            U_former_m3=agreement.former_U.rows(),
+            U_new_m3=agreement.new_U.rows(),
+            E_n=agreement.E_n,
+            c_limit=agreement.c_limit,
+            for_use=basis.usable,
+        ),
         waterfall=_waterfall(basis),
         deliveries=deliveries,
         courses=compare_courses(
@@ -147,7 +158,14 @@ def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
             agreement.used_c,
             float(rounding_sd_m3(former, new)),
         ),
-        correlation=_correlation(agreement, worst),
+        correlation=Correlation(
+            c=agreement.c,
+            source="not_declared" if agreement.c is None else "declared",
+            worst_E_n=worst and worst.E_n,
+            worst_E_n_at_half=worst and worst.at_half,
+            c_limit=worst and worst.c_limit,
+            coverage_k=agreement.new_U.k if worst else None,
+        ),
         judged_from_m=from_m,
         legal=legal,
         ages=ages,
@@ -296,32 +314,6 @@ def _find_worst_error(basis, agreement, deliveries):
 
 
 # ---- content of the file
-
-
-def _correlation(agreement, worst):
-    return Correlation(
-        c=agreement.c,
-        source="not_declared" if agreement.c is None else "declared",
-        worst_E_n=worst and worst.E_n,
-        worst_E_n_at_half=worst and worst.at_half,
-        c_limit=worst and worst.c_limit,
-        coverage_k=agreement.new_U.k if worst else None,
-    )
-
-
-def _rows(basis, agreement):
-    return ComparedRows(
-        height_m=basis.height_m,
-        former_m3=basis.former_m3,
-        former_on_basis_m3=basis.on_basis_m3,
-        new_m3=basis.new_m3,
-        d_m3=basis.new_m3 - basis.on_basis_m3,
-        U_former_m3=agreement.former_U.rows(),
-        U_new_m3=agreement.new_U.rows(),
-        E_n=agreement.E_n,
-        c_limit=agreement.c_limit,
-        for_use=basis.usable,
-    )
 
 
 def _waterfall(basis):

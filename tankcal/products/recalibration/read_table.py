@@ -281,7 +281,7 @@ def _select_courses(former, courses):
     if unknown.all():
         return _find_course_heights(former, courses), (), False
     total = float(np.sum(heights))
-    if total < last - _slack(former):
+    if total < last - (0.35 + ABOVE_M if former.height_m[0] == 0 else ABOVE_M):
         expected = message(
             "read_courses_end",
             "the courses reach {total:.4g} m, the table {last:.4g} m; expected courses up to the "
@@ -303,11 +303,6 @@ def _select_courses(former, courses):
         count=reached,
     )
     return courses.first(reached), (text,), True
-
-
-def _slack(former):
-    """Largest possible height of the bottom of the first course above the zero, m."""
-    return 0.35 + ABOVE_M if former.height_m[0] == 0 else ABOVE_M
 
 
 def _find_course_heights(former, courses):

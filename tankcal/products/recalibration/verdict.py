@@ -299,7 +299,12 @@ def _age_reasons(ages):
 def _difference_reasons(worst, c):
     if worst is None or not abs(worst.E_n) > 1:
         return []
-    return [Reason("tank_differs", {"E_n": _finite(worst.E_n), "c": c or 0.0, **worst.place})]
+    return [
+        Reason(
+            "tank_differs",
+            {"E_n": worst.E_n if np.isfinite(worst.E_n) else None, "c": c or 0.0, **worst.place},
+        )
+    ]
 
 
 def _agreement_reasons(worst, c):
@@ -312,7 +317,3 @@ def _agreement_reasons(worst, c):
         limit = None if np.isnan(worst.c_limit) else worst.c_limit
         reasons.append(Reason("c_not_declared", {"c_limit": limit}))
     return reasons
-
-
-def _finite(value):
-    return value if np.isfinite(value) else None

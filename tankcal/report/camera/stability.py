@@ -233,16 +233,15 @@ def tables(result):
     return {
         "cameras.csv": [_camera_row(camera) for camera in result["cameras"]],
         "pairs.csv": [
-            {key: value for key, value in _pair_row(row).items() if not _is_array(key)}
+            {
+                key: value
+                for key, value in _pair_row(row).items()
+                if not (key.startswith("difference") or key in ("rotation_deg", "shift_m"))
+            }
             | {"a": row["a"], "b": row["b"]}
             for row in result["pairs"]
         ],
     }
-
-
-def _is_array(key):
-    """Whether a key of a pair contains a map or a vector; CSV rows have its elements."""
-    return key.startswith("difference") or key in ("rotation_deg", "shift_m")
 
 
 def _camera_row(camera):

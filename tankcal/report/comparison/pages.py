@@ -82,22 +82,27 @@ def verdict(paper):
         blocks.result(paper.word("labels.verdict"), paper.word(f"verdicts.{code}"), note),
         blocks.paragraph(paper.word(f"texts.verdict_{code}")),
         *([paper.heading("reasons"), blocks.listing(reasons)] if reasons else []),
-        *([_rule(paper, rule)] if rule else []),
+        *(
+            [
+                paper.facts(
+                    [
+                        ("rule", rule["name"]),
+                        ("rule_file", rule["file"]),
+                        ("rule_source", rule["source"]),
+                        ("rule_verified", _verified(paper, rule)),
+                        ("verdict_verified", _verified(paper, paper.record)),
+                        ("rule_remark", rule["remark"]),
+                        (
+                            "rule_asked",
+                            paper.word("texts.rule_default") if rule["is_default"] else None,
+                        ),
+                    ]
+                )
+            ]
+            if rule
+            else []
+        ),
     ]
-
-
-def _rule(paper, rule):
-    return paper.facts(
-        [
-            ("rule", rule["name"]),
-            ("rule_file", rule["file"]),
-            ("rule_source", rule["source"]),
-            ("rule_verified", _verified(paper, rule)),
-            ("verdict_verified", _verified(paper, paper.record)),
-            ("rule_remark", rule["remark"]),
-            ("rule_asked", paper.word("texts.rule_default") if rule["is_default"] else None),
-        ]
-    )
 
 
 def _verified(paper, entry):

@@ -72,7 +72,16 @@ def pages(paper, folder=None, whole=False):
         *paper.head(folder),
         blocks.result(paper.word("labels.history"), _span(paper), _summary(paper)),
         *_certificates(paper),
-        *_volumes(paper, whole),
+        *[
+            paper.heading("volumes"),
+            paper.paragraph(
+                "volumes",
+                date=paper.day(paper.newest["date"]),
+                k=paper.number(paper.record["coverage_k"], decimals=2),
+            ),
+            paper.figure(draw_volumes(paper), "volumes"),
+            *_table(paper, VOLUMES, volume_rows(paper.record), whole),
+        ],
         *_radii(paper, whole),
         *_changes(paper),
         *_inspections(paper),
@@ -114,20 +123,6 @@ def _certificates(paper):
         paper.heading("certificates"),
         paper.show(table, rows),
         paper.show(table, rows, on="certificate_facts"),
-    ]
-
-
-def _volumes(paper, whole):
-    """Return the volumes at some dips on one basis, and their figure."""
-    return [
-        paper.heading("volumes"),
-        paper.paragraph(
-            "volumes",
-            date=paper.day(paper.newest["date"]),
-            k=paper.number(paper.record["coverage_k"], decimals=2),
-        ),
-        paper.figure(draw_volumes(paper), "volumes"),
-        *_table(paper, VOLUMES, volume_rows(paper.record), whole),
     ]
 
 

@@ -255,7 +255,16 @@ def form_of_wall(plan):
     datum = datum_of(design)
     if datum is not None:
         settings.setdefault("adjustment.datum", datum)
-    tables = {name: _without_values(table) for name, table in tables_of(plan).items()}
+    tables = {
+        name: tuple(
+            {
+                name: "" if name in READINGS else _shorten_cell(cell)
+                for name, cell in zip(table.headings, row, strict=True)
+            }
+            for row in table.rows
+        )
+        for name, table in tables_of(plan).items()
+    }
     if design.runs:
         tables["liquid"] = _runs(plan)
     return _form(
@@ -291,16 +300,6 @@ def _runs(plan):
         volume = {} if dip else {"volume_m3": "0"}
         rows.append(kept | volume | {"note": f"{_shorten_cell(dip)} m" if dip else ""})
     return tuple(rows)
-
-
-def _without_values(table):
-    return tuple(
-        {
-            name: "" if name in READINGS else _shorten_cell(cell)
-            for name, cell in zip(table.headings, row, strict=True)
-        }
-        for row in table.rows
-    )
 
 
 # ---- texts

@@ -172,7 +172,7 @@ def pages(paper):
         *_scores(paper),
         *_reading(paper),
         *_figures(paper),
-        *_tables(paper),
+        *[paper.heading("tables"), paper.show(TABLES, TABLES.rows(paper.record))],
         *_warnings(paper),
     ]
 
@@ -224,11 +224,6 @@ def _figures(paper):
                          second=second)
         )  # fmt: skip
     return page_blocks
-
-
-def _tables(paper):
-    """Blocks with the scores of each table."""
-    return [paper.heading("tables"), paper.show(TABLES, TABLES.rows(paper.record))]
 
 
 def _warnings(paper):

@@ -31,7 +31,10 @@ def sentences(paper):
     """Return a sentence on the result for each limit (list of str)."""
     verdict = paper.record["rule"]
     texts = [_limit_sentence(paper, result) for result in verdict["uncertainty"]]
-    texts += [_deviation_sentence(paper, result) for result in verdict["deviation"]]
+    texts += [
+        paper.word("texts.rule_deviation", **deviation_texts(paper, result))
+        for result in verdict["deviation"]
+    ]
     return [*texts, *_propagation_note(paper)]
 
 
@@ -155,10 +158,6 @@ def limit_blocks(paper):
 
 
 # ---- deviations from stated volumes
-
-
-def _deviation_sentence(paper, result):
-    return paper.word("texts.rule_deviation", **deviation_texts(paper, result))
 
 
 def deviation_texts(paper, result):

@@ -148,7 +148,7 @@ def _centre(sure, hints):
 
 def _extend_by_hints(clues, piece, sure, hints, least):
     """Extend a Piece by approximate values, joined by common places or used directly."""
-    if _is_complete(piece) or hints.nothing:
+    if (piece.known.all() and piece.oriented.all()) or hints.nothing:
         return piece
     if (piece.known.sum() + piece.oriented.sum()) >= ENOUGH:
         local = grow_piece(clues, _credible(clues, hints.without(sure).piece), least)
@@ -198,10 +198,6 @@ def _remove_photos(piece, photos):
         place_m=np.where(photos[:, None], np.nan, piece.place_m),
         rotation=np.where(photos[:, None, None], np.nan, piece.rotation),
     )
-
-
-def _is_complete(piece):
-    return piece.known.all() and piece.oriented.all()
 
 
 def _fill_start_values(clues, piece, sure, hints, centre, reasons):

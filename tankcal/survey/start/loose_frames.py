@@ -55,7 +55,10 @@ def join_local_frames(clues, piece, places, least):
             break
         piece, loose = _attach_frames(clues, piece, [*loose, local], least)
         tried |= local.oriented | piece.oriented
-    if loose and not (piece.oriented.any() or (piece.known & ~_held_points(clues.survey)).any()):
+    if loose and not (
+        piece.oriented.any()
+        or (piece.known & ~np.isfinite(certain_places(clues.survey).piece.xyz_m).any(axis=1)).any()
+    ):
         local = max(loose, key=lambda frame: frame.oriented.sum())
         # Without a place in common, align the largest frame to single known coordinates.
         motion = align_piece(clues.survey, local, piece.xyz_m, places)
@@ -133,11 +136,6 @@ def _scale_about_photo(clues, piece, original, places):
     if not scale > 0:
         return piece
     return original.fill_from(bare.moved(Motion(np.eye(3), hinge * (1 - scale), scale, 0.0)))
-
-
-def _held_points(survey):
-    """Mask (points,) of points with certain coordinates."""
-    return np.isfinite(certain_places(survey).piece.xyz_m).any(axis=1)
 
 
 def _scale_by_distances(clues, piece):
@@ -227,7 +225,9 @@ class _FrameClues:
         self.known_m = np.vstack([known_m, place_m])
         self.size = max(piece.extent, 1e-9)
         self.which = np.nonzero(np.vstack([points, photos]))
-        self.others = [_rows_between(item, piece.known) for item in survey.observations
+        self.others = [item.taken(
+        item.in_use & piece.known[item.start] & piece.known[item.end]
+    ) for item in survey.observations
                        if item.knows_frame]  # fmt: skip
         target = np.where(np.vstack([points, photos]), self.known_m, np.nan)
         counts = np.isfinite(target).sum(axis=0)
@@ -242,13 +242,6 @@ class _FrameClues:
         for item in self.others:
             parts += item.off_frame(xyz[item.end] - xyz[item.start])
         return np.concatenate(parts)
-
-
-def _rows_between(observations, known):
-    """Rows of an observation between known points."""
-    return observations.taken(
-        observations.in_use & known[observations.start] & known[observations.end]
-    )
 
 
 def _fit_from(clues, rotation, shift_m):

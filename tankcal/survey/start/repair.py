@@ -32,7 +32,9 @@ def repair_photos(sights, piece, held, rng, wall=None):
     """
     for _ in range(MENDING):
         errors = photo_errors(sights, piece)
-        bad = errors > max(WORSE * _middle(errors), SMALL_ERROR)
+        bad = errors > max(
+            WORSE * (float(np.nanmedian(errors)) if np.isfinite(errors).any() else 0.0), SMALL_ERROR
+        )
         bad &= piece.oriented & ~held
         if not bad.any():
             return piece
@@ -49,11 +51,6 @@ def repair_photos(sights, piece, held, rng, wall=None):
             return piece
         piece = again
     return piece
-
-
-def _middle(errors):
-    """Median of the finite errors, or 0."""
-    return float(np.nanmedian(errors)) if np.isfinite(errors).any() else 0.0
 
 
 def photo_errors(sights, piece):

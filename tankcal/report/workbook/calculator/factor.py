@@ -30,7 +30,9 @@ def factor_sheet(book, record):
     if not capacity["inputs"]:
         return
     heights = capacity["height_m"]
-    columns = [Column(_dip(book), heights, height_digits(heights), 12)]
+    columns = [
+        Column(book.word("columns.dip_m", of="calculator"), heights, height_digits(heights), 12)
+    ]
     factor_columns = factor_of(capacity).T
     columns += [
         Column(name, cells.tolist(), _DIGITS, _WIDTH)
@@ -38,7 +40,3 @@ def factor_sheet(book, record):
     ]
     sheet = book.plain_sheet("covariance_factor", columns, landscape=True)
     book.name("covariance_factor", sheet, 1, len(heights), 1, len(columns) - 1)
-
-
-def _dip(book):
-    return book.word("columns.dip_m", of="calculator")

@@ -105,7 +105,18 @@ def write_input(book, sheet, row, entry):
         book.put(sheet, row, 1, entry.value, num_format=number_format(entry.digits), **look)
     book.put(sheet, row, 2, entry.unit, indent=1)
     book.name(entry.name, sheet, row, row, 1)
-    rule = _list(book) if entry.low is None else _numbers(book, entry)
+    rule = (
+        {
+            "validate": "list",
+            "source": "=product_groups",
+            "input_title": book.word("short.product", of="calculator"),
+            "input_message": book.word("prompts.product", of="calculator"),
+            "error_title": book.word("texts.error_title", of="calculator"),
+            "error_message": book.word("errors.product", of="calculator"),
+        }
+        if entry.low is None
+        else _numbers(book, entry)
+    )
     sheet.data_validation(row, 1, row, 1, {**rule, "ignore_blank": True})
 
 
@@ -137,14 +148,3 @@ def _ends(entry, marks):
     if entry.unit in ("m", "m³"):
         return fixed(entry.low, entry.digits, marks), fixed(entry.high, entry.digits, marks)
     return shortest(entry.low, marks), shortest(entry.high, marks)
-
-
-def _list(book):
-    return {
-        "validate": "list",
-        "source": "=product_groups",
-        "input_title": book.word("short.product", of="calculator"),
-        "input_message": book.word("prompts.product", of="calculator"),
-        "error_title": book.word("texts.error_title", of="calculator"),
-        "error_message": book.word("errors.product", of="calculator"),
-    }
