@@ -53,6 +53,7 @@ from tankcal.gum.components import (
     scale_source,
     together_dof,
     triangular,
+    type_of,
 )
 from tankcal.gum.coverage import coverage_factor, dof_of, effective_dof, least_of, sum_of_fourths
 from tankcal.gum.inputs import Input, Inputs
@@ -81,6 +82,7 @@ __all__ = [
     "sum_of_fourths",
     "together_dof",
     "triangular",
+    "type_of",
 ]
 _COMPLEX_STEP = 1e-30  # without cancellation, the step can be arbitrarily small
 _AGREEMENT = 1e-3  # relative to u of the output, and to a sensitivity: the digits of a budget

@@ -27,6 +27,15 @@ NO_EIGENVALUE = 1e-12  # relative to the largest eigenvalue; smaller eigenvalues
 ROUNDING = 1e-12  # relative to the largest volume of a table; smaller values are rounding
 
 
+def type_of(dof):
+    """Return the type of evaluation of the uncertainty of readings, "A" or "B".
+
+    An evaluation of type A is a statistic of a series of observations (JCGM 100:2008, 4.2), and
+    has their finite degrees of freedom. Declared standard deviations and priors are of type B.
+    """
+    return "A" if np.isfinite(dof) else "B"
+
+
 @dataclass(frozen=True)
 class Source:
     """One source of uncertainty, with one or more columns of the factor of the covariance.
@@ -43,7 +52,7 @@ class Source:
     u, unit : float and str, or None
         As declared; None for a computed source.
     type : str
-        Type of evaluation, "A" or "B".
+        Type of evaluation, "A" or "B"; see `type_of`.
     distribution : str
         Name of the distribution.
     note : str
@@ -65,7 +74,7 @@ class Source:
     dof: float = np.inf
     u: float | None = None
     unit: str | None = None
-    type: str = "A"
+    type: str = "B"
     distribution: str = "normal"
     note: str = ""
     estimate: float | None = None
@@ -285,7 +294,6 @@ def _join_sources(names, sources, pairs):
         " & ".join(names),
         _correlate_columns(parts, correlation),
         together_dof([part.u_dof for part in parts]),
-        type="B",
         is_default=any(part.is_default for part in parts),
         parts=parts,
         correlation=correlation,

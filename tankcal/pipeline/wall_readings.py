@@ -322,7 +322,7 @@ def factors_of_readings(readings, weights):
         factors.append(Factor(kind, separate))
     for (kind, name), (u, unit, column) in shared_effects(readings).items():
         column_of_features = (weights @ column)[:, None]
-        factors.append(Factor(kind, column_of_features, u=u, unit=unit, type="B", note=name))
+        factors.append(Factor(kind, column_of_features, u=u, unit=unit, note=name))
     return tuple(factor for factor in factors if np.any(factor.columns))
 
 

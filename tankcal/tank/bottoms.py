@@ -32,7 +32,7 @@ from tankcal.tank.parts import Part, as_levels
 from tankcal.tank.terrain import Surface, surface
 from tankcal.tank.tips import FORMS as TIPS
 from tankcal.tank.tips import Tip, tip_of
-from tankcal.uncertainty import Source, factor_of
+from tankcal.uncertainty import Source, factor_of, type_of
 
 MESH, COVARIANCE_MESH = (48, 144), (16, 48)  # rings and azimuths of the meshes
 FEWEST_POINTS, MOST_POINTS = 12, 500  # least and largest number of surveyed points
@@ -522,8 +522,18 @@ class SurfaceBottom(Part):
         share = np.column_stack([np.interp(wet, at_edges, unit) for unit in np.eye(len(edges))[1:]])
         by_points = share @ self.survey.by_points_m2
         return (
-            Source("bottom_points", share @ self.survey.noise_m3, self.survey.noise_dof),
-            Source("bottom_form", share @ self.survey.form_m3, self.survey.form_dof),
+            Source(
+                "bottom_points",
+                share @ self.survey.noise_m3,
+                self.survey.noise_dof,
+                type=type_of(self.survey.noise_dof),
+            ),
+            Source(
+                "bottom_form",
+                share @ self.survey.form_m3,
+                self.survey.form_dof,
+                type=type_of(self.survey.form_dof),
+            ),
             *(factor.source(by_points @ factor.columns) for factor in self.shared),
         )
 

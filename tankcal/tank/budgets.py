@@ -125,7 +125,6 @@ def _default(name, half_width):
         np.array([[u]]),
         u=u,
         unit="m3",
-        type="B",
         distribution="rectangular",
         is_default=True,
     )

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.uncertainty import Source, factor_of
+from tankcal.uncertainty import Source, factor_of, type_of
 
 LEAST_SHARE = 1e-6  # tolerance for rounding of the share of a named cause in the covariance
 
@@ -28,7 +28,7 @@ class Factor:
     dof: float = np.inf
     u: float | None = None
     unit: str | None = None
-    type: str = "A"
+    type: str = "B"
     note: str = ""
     is_default: bool = False
 
@@ -79,7 +79,7 @@ def survey_factors(covariance, dof=np.inf, causes=(), effects=()):
     """
     factor = factor_of(covariance)
     if len(causes) == 0:
-        return (Factor("points", factor, dof),)
+        return (Factor("points", factor, dof, type=type_of(dof)),)
     shares = factor.T @ np.column_stack(effects) / np.sum(factor**2, axis=0)[:, None]
     # Coordinates of the effects in the factor; singular values above 1 would leave a negative
     # remainder.
@@ -91,7 +91,7 @@ def survey_factors(covariance, dof=np.inf, causes=(), effects=()):
     remaining[: len(size)] = np.sqrt(np.maximum(1 - size**2, 0.0))
     remainder = factor @ (basis * remaining)
     return (
-        Factor("points", remainder[:, remaining > 0], dof),
+        Factor("points", remainder[:, remaining > 0], dof, type=type_of(dof)),
         *cause_factors(causes, effects),
     )
 
@@ -104,7 +104,6 @@ def cause_factors(causes, effects):
             np.column_stack(columns),
             u=cause.u,
             unit=cause.unit,
-            type="B",
             note=cause.name,
             is_default=cause.is_assumed,
         )

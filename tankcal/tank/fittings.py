@@ -78,7 +78,6 @@ class Deadwood(Part):
                 parts[:, [index]] * u,
                 u=float(u),
                 unit="m3",
-                type="B",
                 note=name,
             )
             for index, (name, u) in enumerate(zip(self.names, self.u_m3, strict=True))

@@ -75,10 +75,8 @@ class MeasuredBottom(Part):
         # Distance of the curve from straight lines between the measured volumes.
         bend = self.curve(levels) - np.interp(levels, self.levels_m, self.volumes_m3)
         return (
-            Source("bottom_liquid", np.column_stack(errors), type="B"),
-            Source(
-                "bottom_curve", bend[:, None] / np.sqrt(3), type="B", distribution="rectangular"
-            ),
+            Source("bottom_liquid", np.column_stack(errors)),
+            Source("bottom_curve", bend[:, None] / np.sqrt(3), distribution="rectangular"),
         )
 
     def _limit_levels(self, levels_m):

@@ -183,14 +183,14 @@ class StrappedSphere:
                         + weights @ part @ weights.T
                     )
             if np.any(covariance):
-                yield Factor(kind, factor_of(covariance), type="B", note="assumed")
+                yield Factor(kind, factor_of(covariance), note="assumed")
 
     def _factors_of_prior(self, solid, levels):
         """`Factor` of the part of degree 2 that the straps do not determine."""
         columns = self._by_unknowns(solid, levels) @ self.fit.by_prior
         is_negligible = np.abs(columns).max(axis=0) < ROUNDING * solid.capacity_m3
         if not np.all(is_negligible):
-            yield Factor("oblateness", columns[:, ~is_negligible], type="B", note="assumed")
+            yield Factor("oblateness", columns[:, ~is_negligible], note="assumed")
 
 
 def find_strapped_sphere(job, progress):

@@ -160,7 +160,7 @@ def update_by_survey(job, surveyed, progress):
             :, None
         ] * change.shared_m
         causes = [_less_shared(cause, radii, change.shared_m) for cause in causes]
-        causes.append(Factor(SHARED, shared_columns, u=1000 * change.shared_m, unit="mm", type="B"))
+        causes.append(Factor(SHARED, shared_columns, u=1000 * change.shared_m, unit="mm"))
     by_inputs = {name: update.gain @ column for name, column in measured_radii.by_inputs.items()}
     wall = wall_of_radii(job, former + update.change_m, causes, by_inputs)
     u_found = np.sqrt(np.diag(measured_radii.noise_m2))
@@ -274,8 +274,7 @@ def _significant_causes(causes):
     if not form_causes:
         return other_causes
     columns = np.hstack([cause.columns for cause in form_causes])
-    type_ = "B" if any(cause.type == "B" for cause in form_causes) else "A"
-    return (*other_causes, Factor(FORM, columns, type=type_))
+    return (*other_causes, Factor(FORM, columns))
 
 
 def _former_causes(radii, change):
@@ -288,9 +287,9 @@ def _former_causes(radii, change):
         replace(separate, columns=columns),
         Factor(
             CHANGE_COMMON, np.full((count, 1), change.common_m), u=1000 * change.common_m,
-            unit="mm", type="B",
+            unit="mm",
         ),
-        Factor(CHANGE_OWN, change.own_m * np.eye(count), type="B"),
+        Factor(CHANGE_OWN, change.own_m * np.eye(count)),
     )  # fmt: skip
 
 

@@ -116,8 +116,8 @@ def causes_of(radii):
     """`Factor`s of the uncertainty of `Radii`: common to all courses, and separate for each."""
     common = np.full((len(radii.radius_m), 1), radii.u_common_m)
     return (
-        Factor(COMMON, common, u=1000 * radii.u_common_m, unit="mm", type="B"),
-        Factor(OWN, factor_of(radii.covariance_m2), type="B"),
+        Factor(COMMON, common, u=1000 * radii.u_common_m, unit="mm"),
+        Factor(OWN, factor_of(radii.covariance_m2)),
     )
 
 

@@ -149,7 +149,7 @@ class RingFeatures:
             ]
             if name == "oval":  # the amplitude of cos 2a is sqrt(2) times the sd of the radius
                 columns += self._waves(np.sqrt([2 * FLATTENED * shape**2]), common=True)
-            yield Factor(kind, np.column_stack(columns), type="B", note="assumed")
+            yield Factor(kind, np.column_stack(columns), note="assumed")
 
     def _waves(self, sds_m, *, common):
         """Columns of waves with the given standard deviations, common to all rings or one per ring.

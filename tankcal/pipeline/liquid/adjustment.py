@@ -40,7 +40,7 @@ from tankcal.tank.liquid import (
     reduce_steps,
 )
 from tankcal.tank.liquid.reduction import ReadingEffects, load_densities
-from tankcal.uncertainty import Source
+from tankcal.uncertainty import Source, type_of
 
 MOST_ROUNDS, SETTLED = 30, 1e-3  # largest number of steps of the sizes, and size of the last in sds
 # Smallest decrease of chi-square by a step, and largest decrease that further steps may bring, both
@@ -357,20 +357,16 @@ def _results_for_body(geometry, geometry_parts, adjusted, liquid_parts):
 def _sources_of_liquid(adjusted, metering, fill, run):
     """Sources of the uncertainty of the liquid itself, with columns by the misclosures."""
     sources = [
-        Source(effect.kind, _reduce_columns(adjusted, effect.columns), type="B")
-        for effect in adjusted.noise
+        Source(effect.kind, _reduce_columns(adjusted, effect.columns)) for effect in adjusted.noise
     ]
     for effect in adjusted.effects:
         if effect.kind == "meter_factor":
             sources += _meter_sources(effect, metering, fill)
         elif effect.kind == RUNS:
-            kind = "B" if np.isinf(run.dof) else "A"
-            sources.append(Source(RUNS, effect.columns, run.dof, type=kind))
+            sources.append(Source(RUNS, effect.columns, run.dof, type=type_of(run.dof)))
         elif effect.kind in COMMON:
             u, unit, value = COMMON[effect.kind](metering)
-            sources.append(
-                Source(effect.kind, effect.columns, u=u, unit=unit, type="B", estimate=value)
-            )
+            sources.append(Source(effect.kind, effect.columns, u=u, unit=unit, estimate=value))
     return tuple(sources)
 
 
@@ -405,9 +401,7 @@ def _meter_sources(effect, metering, fill):
     for name, column in zip(fill.meters, effect.columns.T, strict=True):
         meter = metering.meters[name]
         u, note = 1e6 * meter.u_factor, meter.certificate or name
-        sources.append(
-            Source("meter_factor", column[:, None], u=u, unit="ppm", type="B", note=note)
-        )
+        sources.append(Source("meter_factor", column[:, None], u=u, unit="ppm", note=note))
     return sources
 
 

@@ -148,7 +148,7 @@ class JointBody(Body):
         if known.flex_sd:
             columns = known.flex_sd * head - by_y @ known.flex_column
             sources.append(
-                Source("bottom_flex", columns[:, None], u=known.flex_sd, unit="m3/m", type="B",
+                Source("bottom_flex", columns[:, None], u=known.flex_sd, unit="m3/m",
                        estimate=known.flex)
             )  # fmt: skip
         return (
@@ -227,7 +227,7 @@ class JointBody(Body):
         # half-width.
         half = abs(known.bottom_m3) * (1 - known.share(levels))
         columns = half[:, None] / np.sqrt(3)
-        return (Source("below_first_dip", columns, type="B", distribution="rectangular"),)
+        return (Source("below_first_dip", columns, distribution="rectangular"),)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ radius differs from the nominal radius by the standard uncertainty in the job. B
 course are covered by prior components, as in a strapped wall.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -48,9 +48,7 @@ class NominalWall(ReadWall):
 
     def factors(self, job, weights):
         """`Factor`s of the uncertainty of the drawing: common to all courses and of each."""
-        return tuple(
-            replace(factor, type="B") for factor in factors_of_readings(self.accepted, weights)
-        )
+        return factors_of_readings(self.accepted, weights)
 
     def read_with(self, weights):
         """Return no derivatives: no instrument input affects a nominal wall."""

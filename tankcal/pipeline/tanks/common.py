@@ -34,8 +34,7 @@ def factor_of_unseen(kind, parts, sizes, assumed):
     """
     sizes = np.maximum(sizes, 1e-30)
     origin = told_by(float(sizes @ assumed / sizes.sum()))
-    type_ = "B" if origin == "assumed" else "A"
-    return Factor(kind, factor_of(sum(parts)), type=type_, note=origin)
+    return Factor(kind, factor_of(sum(parts)), note=origin)
 
 
 def told_by(assumed):

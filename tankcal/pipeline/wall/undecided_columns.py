@@ -66,7 +66,7 @@ def factors_of_undecided(halves):
         np.sqrt(1 - ALIKE) * halves,
         np.sqrt(ALIKE) * halves.sum(axis=1, keepdims=True),
     )
-    return (Factor("undecided", np.hstack([separate, common]), type="B"),)
+    return (Factor("undecided", np.hstack([separate, common])),)
 
 
 def tell_undecided(names, shell, most):

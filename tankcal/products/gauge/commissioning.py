@@ -293,7 +293,7 @@ def _join(sources, zero_columns):
         columns = -source.columns_m3 + rest.pop(source.kind, 0.0)
         joined.append(replace(source, columns_m3=columns))
     count = len(sources[0].columns_m3)
-    added = (Source(kind, np.full((count, 1), value), type="B") for kind, value in rest.items())
+    added = (Source(kind, np.full((count, 1), value)) for kind, value in rest.items())
     return [*joined, *added]
 
 

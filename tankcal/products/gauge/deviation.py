@@ -189,14 +189,16 @@ def fit_line(dips, known_slope=None, movement_share=0.0):
         estimator = np.vstack([estimator, np.zeros_like(lever)])
     factor_of_scatter, scatter_dof, is_estimated = _scatter(result)
     probability = chdtrc(result.dof, result.chi2) if result.dof > 0 else np.nan
-    scatter = Source("scatter", factor_of_scatter * estimator * dips.u_scatter_m, scatter_dof)
+    scatter = Source(
+        "scatter", factor_of_scatter * estimator * dips.u_scatter_m, scatter_dof, type="A"
+    )
     sources = [scatter]
     for kind, column in shared.items():
         columns = (estimator @ column)[:, None]
         if kind == "gauge scale":  # the slope itself is declared
             columns = columns + np.array([[0.0], [known_slope.u]])
         share = movement_share if kind == "movement" else None
-        sources.append(Source(kind, columns, type="B", estimate=share))
+        sources.append(Source(kind, columns, estimate=share))
     sd = np.sqrt(np.clip(np.diag(covariance - rows @ result.cofactor @ rows.T), 0, None))
     has_check = sd > 1e-9 * np.sqrt(np.diag(covariance))
     w = np.full(len(sd), np.nan)
@@ -237,7 +239,7 @@ def sources_of_dips(dips, line):
     u = line.scatter_factor * dips.u_scatter_m
     return (
         replace(scatter, columns_m3=np.diag(u)),
-        *(Source(kind, column[:, None], type="B") for kind, column in dips.shared.items()),
+        *(Source(kind, column[:, None]) for kind, column in dips.shared.items()),
     )
 
 

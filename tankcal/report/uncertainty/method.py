@@ -2,10 +2,14 @@
 
 from math import inf
 
+import numpy as np
+
+from tankcal.record.covariance_factor import factor_of
 from tankcal.report import blocks, numbers
 from tankcal.report.tables import Column, Table
 from tankcal.report.uncertainty.stated import (
     MARK,
+    MONTE_CARLO,
     flag_simulated,
     k_of_rows,
     limit_rows,
@@ -62,6 +66,7 @@ FROM_SURVEY = (
 )
 # Inputs of the reading of a table.
 OF_READING = ("interpolation", "rounding")
+LARGER_PART = 0.5  # share of the variance above which an input determines a distribution
 
 
 def sentences(paper, mark=MARK):
@@ -78,7 +83,49 @@ def sentences(paper, mark=MARK):
         texts.append(_simulated(paper, mark))
     elif paper.record["job"]["table"].get("monte_carlo") is False:
         texts.append(paper.word("texts.monte_carlo_off"))
-    return texts
+    return [*texts, *default_effects(paper)]
+
+
+def default_effects(paper):
+    """Return a sentence for each default u that determines the distribution of results.
+
+    A result counts if its interval is by Monte Carlo and the default has the larger part of its
+    variance. The sentences name input, u, distribution, and the number of such results.
+    """
+    record = paper.record
+    capacity, budgets = record["capacity"], record.get("budgets", [])
+    defaults = [line for line in budget_lines(record) if line.get("is_default")]
+    factor, kinds = factor_of(capacity), np.array(capacity.get("input_kind") or [])
+    simulated = flag_simulated(capacity)
+    simulated_budgets = [budget for budget in budgets if budget.get("interval") == MONTE_CARLO]
+    sentences = []
+    for line in defaults:
+        # Rows of the table have no lines of a budget; their shares follow from the factor.
+        columns = factor[simulated][:, kinds == line["input"]] if len(kinds) else factor[:0]
+        variance = np.sum(factor[simulated] ** 2, axis=1)
+        of_rows = (np.sum(columns**2, axis=1) / variance)[variance > 0] if len(columns) else []
+        of_budgets = [
+            part["share"] or 0.0
+            for budget in simulated_budgets
+            for part in budget["lines"]
+            if part["input"] == line["input"]
+        ]
+        counts = [int(np.sum(np.asarray(of) > LARGER_PART)) for of in (of_rows, of_budgets)]
+        if any(counts):
+            sentences.append(
+                paper.word(
+                    "texts.default_effect",
+                    input=paper.input_name(line | {"is_default": False}),
+                    u=_format_u(paper, line["u"], line["unit"]),
+                    distribution=_distribution(paper, line),
+                    rows=counts[0],
+                    all_rows=len(simulated),
+                    stated=counts[1],
+                    all_stated=len(budgets),
+                    share=paper.number(max(*of_rows, *of_budgets), "share", digits=2),
+                )
+            )
+    return sentences
 
 
 def k_sentences(paper):
@@ -177,8 +224,12 @@ def _format_input(paper, line):
         "texts.input_u",
         input=name,
         u=_format_u(paper, line["u"], line["unit"]),
-        distribution=paper.words["distributions"].get(line["distribution"], line["distribution"]),
+        distribution=_distribution(paper, line),
     )
+
+
+def _distribution(paper, line):
+    return paper.words["distributions"].get(line["distribution"], line["distribution"])
 
 
 def _format_u(paper, u, unit):
