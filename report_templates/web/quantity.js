@@ -27,11 +27,11 @@ const less1 = (a) => derived(Math.expm1(a.value), [[a, Math.exp(a.value)]]);
 const product = (...factors) => factors.reduce(times);
 const sum = (...terms) => terms.reduce(plus);
 
-/** A refusal: the key of its sentence, and the place: "product", "opening" or "closing". */
+/** A refusal: key of its sentence, place ("product", "opening" or "closing"), and the range. */
 class Refusal extends Error {
-  constructor(key, place = "product") {
+  constructor(key, place = "product", range = null) {
     super(key);
-    Object.assign(this, { key, place });
+    Object.assign(this, { key, place, range });
   }
 }
 
@@ -287,7 +287,9 @@ function followChain(tank, gauging, liquid, place) {
     : over(plus(times(7, celsius), input(gauging.ambient, "ambient")), 8);
   const ctsh = shellFactor(tank, level, shell, expansion);
   const [low, high] = correction.limits(base.value);
-  if (!(gauging.liquid >= low && gauging.liquid <= high)) throw new Refusal("liquid_range", place);
+  if (!(gauging.liquid >= low && gauging.liquid <= high)) {
+    throw new Refusal("liquid_range", place, { label: "t_range", low, high, unit: "°C" });
+  }
   const scale = u.u_vcf === null ? vcfScale(tank.vcf_rule, gauging.liquid, correction.base_c)
     : u.u_vcf / 100;
   const vcf = times(correction.factor(base, celsius), { value: 1, slopes: { vcf: scale } });
@@ -338,9 +340,14 @@ function quantityOf(tank, table, given) {
     base = correction.baseDensity(times(base, glass), given.sample);
   }
   const [least, most] = correction.densities;
-  if (!(base.value >= least && base.value <= most)) throw new Refusal("base_density_range");
+  if (!(base.value >= least && base.value <= most)) {
+    const range = { label: "rho_range", low: least, high: most, unit: "kg/m³" };
+    throw new Refusal("base_density_range", "product", range);
+  }
   const [low, high] = correction.limits(base.value);
-  if (isObserved && !(given.sample >= low && given.sample <= high)) throw new Refusal("sample_range");
+  if (isObserved && !(given.sample >= low && given.sample <= high)) {
+    throw new Refusal("sample_range", "product", { label: "t_range", low, high, unit: "°C" });
+  }
   const liquid = {
     correction, base, u: given.u, isInsulated: given.insulated,
     waterShare: input((given.sw ?? 0) / 100, "sw"), expansion: input(tank.expansion_per_k, "expansion"),

@@ -131,6 +131,12 @@
     critical_high: fixed(tank.roof?.critical_top_m ?? 0, 4),
   })[name] ?? whole);
 
+  /** Text of an allowed range, rounded so that it is never wider. */
+  const rangeText = ({ label, low, high, unit }) => {
+    const [least, most] = [Math.ceil(low * 100 - 1e-6) / 100, Math.floor(high * 100 + 1e-6) / 100];
+    return ` ${spelt.labels[label]}: ${fixed(least, 2)}, ${fixed(most, 2)} ${unit}.`;
+  };
+
   const show = () => {
     try {
       const result = quantityOf(tank, covariance, given());
@@ -140,7 +146,8 @@
     } catch (refusal) {
       if (!(refusal instanceof Refusal)) throw refusal;
       table.replaceChildren();
-      remark.textContent = `${spelt.columns[refusal.place]}: ${spoken.refused} ${sentenceOf(refusal.key)}`;
+      remark.textContent = `${spelt.columns[refusal.place]}: ${spoken.refused} ${sentenceOf(refusal.key)}`
+        + (refusal.range ? rangeText(refusal.range) : "");
       remark.className = "answer refused";
     }
   };

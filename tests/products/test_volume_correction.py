@@ -16,7 +16,7 @@ from tankcal.tank.volume_correction.petroleum import (
     density_of_gravity,
     glass_correction,
 )
-from tankcal.tank.volume_correction.ranges import OutsideRangeError
+from tankcal.tank.volume_correction.ranges import OutsideRangeError, inside
 
 
 def _celsius(fahrenheit):
@@ -258,6 +258,50 @@ def test_values_outside_the_range_are_refused(correction, density, celsius, quan
         correction.factor(np.array([density]), np.array([celsius]))
     assert refused.value.quantity == quantity
     assert correction.name in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("correction", "density", "celsius", "expected"),
+    [
+        # 0 degF is -17.777... degC, 300 degF 148.888... degC
+        (Petroleum(1980, "crude", "15C"), 850.0, 160.0,
+         "found 160; expected -17.77 to 148.88 degC (0 to 300 degF), the range of"),
+        (Petroleum(1980, "products", "15C"), 740.0, -18.0,
+         "found -18; expected -17.77 to 93.33 degC (0 to 200 degF), the range of"),
+        (LiquefiedGas(), 700.0, 20.0,
+         "found 700; expected 349.656 to 687.323 kg/m3 (0.35 to 0.688 relative density"),
+        (LiquefiedGas(), 600.0, -50.0,
+         "found -50; expected -46 to 93 degC (-50.8 to 199.4 degF), the range of"),
+        (Petroleum(2004, "products", "15C"), 550.0, 20.0, "expected 610.6 to 1163.5 kg/m3, the"),
+        (Petroleum(2004, "products", "15C"), 850.0, -51.0, "expected -50 to 150 degC, the range"),
+    ],
+)  # fmt: skip
+def test_a_converted_range_is_printed_with_that_of_the_source(
+    correction, density, celsius, expected
+):
+    with pytest.raises(OutsideRangeError) as refused:
+        correction.factor(np.array([density]), np.array([celsius]))
+    assert expected in str(refused.value)
+
+
+def test_the_range_of_pressure_is_printed_in_psi():
+    with pytest.raises(OutsideRangeError, match=r"0 to 10342\.1 kPa \(0 to 1500 psi\)"):
+        Petroleum(2004, "products", "15C").factor(850.0, 20.0, 11000.0)
+
+
+@pytest.mark.parametrize("decimals", [None, 2])
+def test_a_printed_range_is_never_wider_than_the_range(decimals):
+    rng = np.random.default_rng(7)
+    for low, width in rng.uniform((-200, 0.1), (1000, 900), (2000, 2)):
+        high = low + width
+        least, most = inside(low, high, decimals)
+        assert low <= least <= most <= high
+        step = 10.0 ** (-2 if decimals else np.floor(np.log10(max(abs(low), high))) - 5)
+        assert least - low < step
+        assert high - most < step
+    assert inside(610.6, 1163.5) == (610.6, 1163.5)
+    assert inside(-50.8, 199.4, 2) == (-50.8, 199.4)
+    assert inside(0.0, 0.0) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize(

@@ -189,6 +189,11 @@ def test_the_form_shows_the_stock_or_the_reason_of_a_refusal(tmp_path):
         assert browser.text("#quantity .answer").startswith("Blank: the results are the stock")
         table = browser.text("#quantity table")
         assert f"{record['capacity']['volume_m3'][36]:.3f}" in table.replace(",", "")  # at 9 m
+        browser.run(FILL % json.dumps([("liquid-closing", "160")]))
+        # 0 degF and 200 degF
+        allowed = "Allowed temperature, from and to: -17.77, 93.33 °C."
+        assert browser.text("#quantity .answer").replace("−", "-").endswith(allowed)
+        browser.run(FILL % json.dumps([("liquid-closing", "28")]))
         assert "Room and stock at the closing gauging" in table
         assert "Available room (m³)" in table
         browser.run(FILL % json.dumps([("dip-closing", "0.2")]))

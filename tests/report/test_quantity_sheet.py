@@ -280,6 +280,15 @@ def test_input_outside_a_range_is_refused_in_the_cell(typed, key):
     assert typed[key].line("nsv")[2:] == ["–", "–", "–"]
 
 
+def test_an_allowed_range_is_never_wider_than_that_of_the_correction(upright):
+    # 0 degF is -17.777... degC, 250 degF is 121.111... degC
+    _, sheet = upright["D1250-80 crude"]
+    assert sheet.line("t_range")[:2] == [-17.77, 148.88]
+    _, sheet = upright["D1250-80 products"]
+    assert sheet.line("t_range")[:2] == [-17.77, 93.33]
+    assert sheet.line("rho_range")[:2] == [652.94, 1074.98]
+
+
 def test_a_typed_factor_has_a_U_of_observed_volumes_only(typed):
     sheet = typed["typed"]
     assert sheet.remark("closing") == "Accepted."

@@ -11,7 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.messages import message
-from tankcal.tank.volume_correction.ranges import iterate_density, refuse_outside
+from tankcal.tank.volume_correction.ranges import (
+    FAHRENHEIT,
+    RELATIVE,
+    iterate_density,
+    refuse_outside,
+)
 
 WATER_60F = 999.016  # kg/m3, of the relative density 60/60
 BASE_C, BASE_K = (60.0 - 32.0) / 1.8, 519.67 / 1.8
@@ -126,8 +131,10 @@ class LiquefiedGas:
         critical = np.interp(np.real(density) / WATER_60F, _FLUIDS[:, 0], _FLUIDS[:, 1]) - 273.15
         high = np.minimum(high, critical)
         least, most = LEAST_DENSITY * WATER_60F, MOST_DENSITY * WATER_60F
-        refuse_outside("density_kg_m3", density, least, most, "kg/m3", self.name)
-        refuse_outside("temperature_c", temperature_c, low, high, "degC", self.name)
+        refuse_outside("density_kg_m3", density, least, most, "kg/m3", self.name,
+                       (LEAST_DENSITY, MOST_DENSITY, RELATIVE))  # fmt: skip
+        refuse_outside("temperature_c", temperature_c, low, high, "degC", self.name,
+                       (LOWEST_F, 1.8 * high + 32, FAHRENHEIT))  # fmt: skip
         refuse_outside("pressure_kpa", pressure_kpa, 0.0, 0.0, "kPa", self.name)
 
 

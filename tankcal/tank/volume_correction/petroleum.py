@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.messages import message
-from tankcal.tank.volume_correction.ranges import iterate_density, refuse_outside
+from tankcal.tank.volume_correction.ranges import FAHRENHEIT, iterate_density, refuse_outside
 
 EDITIONS, GROUPS = (1980, 2004), ("crude", "products", "lubricants")
 BASES_C = {"15C": 15.0, "20C": 20.0, "60F": (60.0 - 32.0) / 1.8}
@@ -268,13 +268,15 @@ class Petroleum:
                 HIGHEST_F[:2],
                 HIGHEST_F[2],
             )
-            limits = (LOWEST_F - 32) / 1.8, (high - 32) / 1.8
+            limits = (LOWEST_F - 32) / 1.8, (high - 32) / 1.8, "degC", self.name
+            refuse_outside("temperature_c", temperature_c, *limits, (LOWEST_F, high, FAHRENHEIT))
+            refuse_outside("pressure_kpa", pressure_kpa, 0.0, 0.0, "kPa", self.name)
             groups = GROUPS_60F if self.base == "60F" else GROUPS_15C
-            most_kpa = 0.0
         else:
-            limits, groups, most_kpa = LIMITS_2004_C, GROUPS_2004, _MOST_PSI * KPA_PER_PSI
-        refuse_outside("temperature_c", temperature_c, *limits, "degC", self.name)
-        refuse_outside("pressure_kpa", pressure_kpa, 0.0, most_kpa, "kPa", self.name)
+            refuse_outside("temperature_c", temperature_c, *LIMITS_2004_C, "degC", self.name)
+            limits = 0.0, _MOST_PSI * KPA_PER_PSI, "kPa", self.name
+            refuse_outside("pressure_kpa", pressure_kpa, *limits, (0.0, _MOST_PSI, "psi"))
+            groups = GROUPS_2004
         if self.group is None:
             per_f = ALPHA_1980_PER_F if self.edition == 1980 else ALPHA_2004_PER_F
             low, high = (1.8 * limit for limit in per_f)

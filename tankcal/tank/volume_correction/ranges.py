@@ -1,11 +1,17 @@
 """Ranges of the inputs of a volume correction, and the iteration for the density at the base."""
 
+import math
+
 import numpy as np
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 
 DEGREES = message("unit_degc", "degC")
+FAHRENHEIT = message("unit_degf", "degF")
+RELATIVE = message("unit_relative_density", "relative density at 60 degF")
+SIGNIFICANT = 6  # digits of printed limits
+_BINARY = 1e-12  # relative error of a decimal limit in binary, and of a conversion
 MOST_ROUNDS = 200  # of the fixed-point iteration for a density at the base
 ROUNDS_OF_GROUPS = 30  # later rounds keep the group or class, so that it cannot alternate
 CONVERGED = 1e-13  # relative change of the density
@@ -33,7 +39,35 @@ class OutsideRangeError(InputError):
         return InputError, (self.problems,)
 
 
-def refuse_outside(quantity, value, low, high, unit, source):
+def inside(low, high, decimals=None):
+    """Round the limits of a range for print; the printed range is never wider than the range.
+
+    Parameters
+    ----------
+    low, high : float
+    decimals : int, optional
+        None: six significant digits.
+
+    Returns
+    -------
+    tuple of float
+    """
+    return _round(low, math.ceil, decimals), _round(high, math.floor, decimals)
+
+
+def _round(limit, whole, decimals):
+    """Limit rounded by `whole`, `math.ceil` or `math.floor`."""
+    if decimals is None:
+        decimals = (
+            SIGNIFICANT if limit == 0 else SIGNIFICANT - 1 - math.floor(math.log10(abs(limit)))
+        )
+    nearest = round(limit, decimals)
+    if math.isclose(nearest, limit, rel_tol=_BINARY):
+        return nearest
+    return whole(limit * 10.0**decimals) / 10.0**decimals
+
+
+def refuse_outside(quantity, value, low, high, unit, source, original=None):
     """Raise OutsideRangeError if a value is outside the range of a volume correction.
 
     Parameters
@@ -47,6 +81,8 @@ def refuse_outside(quantity, value, low, high, unit, source):
     unit : str
     source : str
         Volume correction with this range.
+    original : tuple, optional
+        (low, high, unit) of the source, if its range is in another unit.
 
     Raises
     ------
@@ -59,15 +95,30 @@ def refuse_outside(quantity, value, low, high, unit, source):
         return
 
     def expected_at(place):
+        # Converted limits have many digits: the range of the source is printed beside them.
+        is_converted = original is not None and unit == "degC"
+        low_shown, high_shown = inside(lows[place], highs[place], 2 if is_converted else None)
+        shown = {
+            "value": float(values[place]),
+            "low": low_shown,
+            "high": high_shown,
+            "unit": DEGREES if unit == "degC" else unit,
+            "source": source,
+        }
+        if original is None:
+            return message(
+                "outside_volume_correction",
+                "found {value:g}; expected {low:g} to {high:g} {unit}, the range of {source}",
+                **shown,
+            )
+        least, most = inside(*(float(np.broadcast_to(limit, values.shape)[place])
+                               for limit in original[:2]))  # fmt: skip
         return message(
-            "outside_volume_correction",
-            "found {value:g}; expected {low:g} to {high:g} {unit}, the range of {source}",
-            value=float(values[place]),
-            low=float(lows[place]),
-            high=float(highs[place]),
-            unit=DEGREES if unit == "degC" else unit,
-            source=source,
-        )
+            "outside_volume_correction_of",
+            "found {value:g}; expected {low:g} to {high:g} {unit} ({least:g} to {most:g} "
+            "{source_unit}), the range of {source}",
+            least=least, most=most, source_unit=original[2], **shown,
+        )  # fmt: skip
 
     raise OutsideRangeError(quantity, is_outside, expected_at)
 

@@ -16,6 +16,8 @@ from tankcal.text.words import marks_of
 FORM, WORKINGS = "quantity", "quantity_workings"
 _WIDTHS = (52, 19, 19, 19, 17, 9)  # widths of the columns, letters
 _FIRST_ROW = 3
+# Limits of a range, rounded to two decimals so that the shown range is never wider.
+_CEILING, _FLOOR = "-INT(-100*[{key}]+1E-6)/100", "INT(100*[{key}]+1E-6)/100"
 _WRONG = "#B00020"  # colour of refusals
 
 # Sentences on the input; the first ones concern valid input.
@@ -166,13 +168,13 @@ class _Form:
         for state in STATES:
             row = self._remark(row, f"state_{state}")
         for label, cells, digits in (
-            ("rho_b", {1: "rho_b"}, 3),
-            ("rho_range", {1: "rho_low", 2: "rho_high"}, 1),
-            ("t_range", {1: "t_low", 2: "t_high"}, 1),
+            ("rho_b", {"rho_b": "[{key}]"}, 3),
+            ("rho_range", {"rho_low": _CEILING, "rho_high": _FLOOR}, 2),
+            ("t_range", {"t_low": _CEILING, "t_high": _FLOOR}, 2),
         ):
             self._label(row, label, "°C" if label == "t_range" else "kg/m³")
-            for column, key in cells.items():
-                self._result(row, column, key, digits)
+            for column, (key, shown) in enumerate(cells.items(), start=1):
+                self._result(row, column, key, digits, shown=shown)
             row += 1
         for label, key, digits, unit in _STEPS:
             row = self._step(row, label, key, digits, unit)
@@ -246,10 +248,12 @@ class _Form:
         self.sheet.conditional_format(row, 1, row, 1, rule)
         return row + 1
 
-    def _result(self, row, column, key, digits, strong=False):
-        shown = {"bold": True} if strong else {}
-        look = self.book.format(align="right", num_format=number_format(digits), **shown)
-        formula = self.places.formula(f"IF(ISNUMBER([{key}]),[{key}],{NONE})", FORM)
+    def _result(self, row, column, key, digits, strong=False, shown="[{key}]"):
+        """Write a number of the workings, by a formula `shown`; a dash if it is no number."""
+        bold = {"bold": True} if strong else {}
+        look = self.book.format(align="right", num_format=number_format(digits), **bold)
+        text = f"IF(ISNUMBER([{key}]),{shown.format(key=key)},{NONE})"
+        formula = self.places.formula(text, FORM)
         self.sheet.write_formula(row, column, formula, look, NOTHING)
 
     def _step(self, row, label, key, digits, unit):
