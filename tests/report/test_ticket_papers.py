@@ -21,6 +21,7 @@ from tankcal.products.quantity.table import TankTable, read_table
 from tankcal.record.schema import to_plain
 from tankcal.report.letterhead import Letterhead
 from tankcal.report.ticket import TicketPaper, write_ticket
+from tankcal.report.ticket.booklet import BOOKLET
 from tankcal.report.ticket.pages import comparison_text
 from tankcal.report.verification import verify
 from tankcal.tank.fittings import floating_roof
@@ -299,6 +300,32 @@ def test_each_ticket_of_a_file_has_its_document(tank, tmp_path, capsys):
     assert expected == pytest.approx(U, rel=1e-9)
     assert all(verify(file.parent, tank / "results").problems == [] for file in files)
     capsys.readouterr()
+    # Printed together, the pages are those of the documents.
+    booklet = pypdf.PdfReader(folder / BOOKLET)
+    single = [page.extract_text() for file in files
+              for page in pypdf.PdfReader(file.with_suffix(".pdf")).pages]  # fmt: skip
+    assert [page.extract_text() for page in booklet.pages] == single
+    assert [entry.title for entry in booklet.outline] == ["A/1", "B"]
+    attached = {name: content for name, (content,) in booklet.attachments.items()}
+    assert attached == {f"{file.parent.name}/ticket.json": file.read_bytes() for file in files}
+    assert booklet.get_fields() is None
+    before = (folder / BOOKLET).read_bytes()
+    assert main([*ticket, "--out", str(folder), "--quiet"]) == 0
+    assert (folder / BOOKLET).read_bytes() == before
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize("content", [b"", b"%PDF-1.7 mine", b"letter"])
+def test_a_pdf_of_the_user_is_not_replaced_by_the_pages(tank, tmp_path, capsys, content):
+    folder, rows = tmp_path / "out", tmp_path / "rows.csv"
+    folder.mkdir()
+    (folder / BOOKLET).write_bytes(content)
+    rows.write_text("ticket\nA\n", encoding="utf-8")
+    ticket = ["ticket", str(tank / "results"), str(tank / "ticket.toml"), "--tickets", str(rows)]
+    assert main([*ticket, "--out", str(folder)]) == 2
+    assert "tickets.pdf: found a file that tankcal ticket did not write" in capsys.readouterr().err
+    assert [path.name for path in folder.iterdir()] == [BOOKLET]
+    assert (folder / BOOKLET).read_bytes() == content
 
 
 def test_folders_of_tickets_are_checked_before_the_first_document(tank, tmp_path, capsys):

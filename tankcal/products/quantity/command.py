@@ -50,8 +50,8 @@ def add(commands):
         "--out",
         metavar="DIR|FILE.csv",
         help="folder for the document of a ticket (ticket.json, PDF to sign, XML, workbook, web "
-        "page), all files or none; with --tickets a folder in it for each ticket; or a .csv file "
-        "for every step of the tickets",
+        "page), all files or none; with --tickets a folder in it for each ticket, and all pages in "
+        "tickets.pdf; or a .csv file for every step of the tickets",
     )
     add_language(ticket)
     ticket.add_argument("--quiet", action="store_true", help="no progress, only problems")
@@ -123,23 +123,33 @@ def _write_document(tickets, folder, show):
 
 
 def _write_documents(tickets, folder, show):
-    """Write the document of each ticket of a CSV file, and return the names of their folders."""
+    """Write the document of each ticket of a CSV file, and a PDF of all pages.
+
+    Returns the names of the folders and of the PDF.
+    """
     from tankcal.products.quantity.saving import document_file
     from tankcal.report.ticket import refuse_foreign, write_ticket
+    from tankcal.report.ticket.booklet import BOOKLET, refuse_foreign_booklet, write_booklet
     from tankcal.text.naming import file_name
+    from tankcal.text.words import load_words
 
     names = [file_name(name, f"ticket_{row + 1}") for row, name in enumerate(tickets.names)]
+    names = [f"{name}_" if name.casefold() == BOOKLET else name for name in names]
     _refuse_equal_folders(tickets, names)
     for name in names:
         refuse_foreign(folder / name)
+    refuse_foreign_booklet(folder / BOOKLET)
     # An error in any ticket is reported before the first document.
     contents = [document_file(tickets.single(row)) for row in range(len(names))]
     writing = message("ticket_documents", "writing the documents of the tickets")
     for row, (name, content) in enumerate(zip(names, contents, strict=True)):
         show.part(writing, row, len(names))
         write_ticket(content, folder / name, language_of_run())
+    folders = [folder / name for name in names]
+    title = load_words(language_of_run())["ticket"]["titles"]["tickets"]
+    write_booklet(list(zip(tickets.names, folders, strict=True)), folder / BOOKLET, title)
     show.end()
-    return names
+    return [*names, BOOKLET]
 
 
 def _refuse_equal_folders(tickets, names):
