@@ -13,7 +13,7 @@ from tankcal.errors import InputError
 from tankcal.job import folder
 from tankcal.job.tables import MAX_COLUMNS, MAX_LINES, Log
 from tankcal.products.fieldbooks.detection import read_book
-from tankcal.products.linter import grids
+from tankcal.products.linter import grids, pdf_text
 from tankcal.products.linter.linting import lint
 from tankcal.products.linter.pdf_text import MOST_CONTENT
 
@@ -80,15 +80,47 @@ def test_jobxml_has_many_lines_for_each_reading():
     assert book.format == "jxl"
 
 
+def write_pdf(path, pages, content):
+    """Write a PDF whose pages have this content and a font F1."""
+    name, mapping = pypdf.generic.NameObject, pypdf.generic.DictionaryObject
+    font = {"/Type": "/Font", "/Subtype": "/Type1", "/BaseFont": "/Helvetica"}
+    font = mapping({name(key): name(value) for key, value in font.items()})
+    resources = mapping({name("/Font"): mapping({name("/F1"): font})})
+    written = pypdf.PdfWriter()
+    for _ in range(pages):
+        page = written.add_blank_page(595, 842)
+        drawn = pypdf.generic.DecodedStreamObject()
+        drawn.set_data(content)
+        page[name("/Resources")] = resources
+        page[name("/Contents")] = written._add_object(drawn)
+    written.write(path)
+
+
 @pytest.mark.slow
 def test_pages_that_draw_more_than_a_table(tmp_path):
     path = tmp_path / "old.pdf"
-    written = pypdf.PdfWriter()
-    for _ in range(2):
-        page = written.add_blank_page(595, 842)
-        drawn = pypdf.generic.DecodedStreamObject()
-        drawn.set_data(b"BT (1.0 2.0) Tj ET\n" * (MOST_CONTENT // 30))
-        page[pypdf.generic.NameObject("/Contents")] = written._add_object(drawn)
-    written.write(path)
+    write_pdf(path, 2, b"BT (1.0 2.0) Tj ET\n" * (MOST_CONTENT // 30))
     expected = "more than 2.5 MB of text and drawings on its pages"
     assert expected in refusal(lambda: lint(path))
+
+
+def test_prose_is_no_heading(monkeypatch):
+    """The words of prose are not examined: their number made a report of 200 pages take 29 s."""
+
+    def examine(cell):
+        raise AssertionError(f"{cell!r} was examined")
+
+    monkeypatch.setattr(grids, "heading_of", examine)
+    monkeypatch.setattr(grids, "is_unit", examine)
+    assert (
+        grids.tables_in_text(["The volume at each height of 3 m is printed below.\n" * 900]) == []
+    )
+
+
+@pytest.mark.slow
+def test_pages_that_take_too_long(tmp_path, monkeypatch):
+    monkeypatch.setattr(pdf_text, "MOST_SECONDS", 1)
+    path = tmp_path / "old.pdf"
+    write_pdf(path, 20, b"BT /F1 8 Tf\n" + b"1 0 0 1 20 700 Tm (7) Tj\n" * 4000 + b"ET")
+    expected = "old.pdf: not read within 1 seconds; expected only the pages of the table"
+    assert refusal(lambda: lint(path)) == expected

@@ -217,8 +217,8 @@ def tables_in_text(pages):
     for page, text in enumerate(pages, 1):
         for line, content in enumerate(text.split("\n")[: MOST_LINES_OF_PAGE - 1], 1):
             words, row = split_words(content), MOST_LINES_OF_PAGE * page + line
-            is_units = bool(words) and all(is_unit(word.text) for word in words)
-            if is_units and current is not None and since < _LINES_OF_HEADING:
+            may_be_units = words and current is not None and since < _LINES_OF_HEADING
+            if may_be_units and all(is_unit(word.text) for word in words):
                 current.units, since = current.units or words, since + 1
             elif _is_heading(words):
                 current, since = _Section(words, row=row), 0
@@ -262,6 +262,8 @@ def is_data(words):
 
 def _is_heading(words):
     """Whether a line has headings of heights and volumes."""
+    if len(words) < 2:  # a line of prose is one cell
+        return False
     roles = [heading_of(word.text).role for word in words]
     return "volume" in roles and ("height" in roles or "ullage" in roles)
 

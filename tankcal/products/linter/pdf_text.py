@@ -12,9 +12,12 @@ from tankcal.messages import message
 
 MOST_PAGES = 300
 MOST_CONTENT = 2_500_000  # largest size of the page content, bytes; layout takes some ten seconds
-MOST_SECONDS = 60
+MOST_SECONDS = 15  # processor time of the child; a table of 200 pages takes about 6
+LONGEST_WAIT_S = 120  # by the clock, on a busy machine
+ENDED_BY_CPU_LIMIT = -24  # exit status: SIGXCPU
 MEMORY_LIMIT = 2 << 30  # address space of the child, bytes
-PAGES, ENCRYPTED, MANY_PAGES, LONG_TEXT, DAMAGED = "pages", "encrypted", "many", "long", "damaged"
+PAGES, ENCRYPTED, MANY_PAGES, LONG_TEXT = "pages", "encrypted", "many", "long"
+DAMAGED, SLOW = "damaged", "slow"
 _CODE = (
     "import json, sys; request = json.loads(sys.argv[1]); sys.path[:] = request['sys_path']; "
     "from tankcal.products.linter.pdf_text import main; main(request)"
@@ -57,23 +60,36 @@ def _refusal(kind, answer):
             "the table",
             most=MOST_CONTENT / 1e6,
         )
+    if kind == SLOW:
+        return message(
+            "lint_slow_pdf",
+            "not read within {most} seconds; expected only the pages of the table",
+            most=MOST_SECONDS,
+        )
     return message("lint_damaged_pdf", "not a PDF that can be read, or damaged")
 
 
 def _ask_child(path):
     """Return the answer of a child process: (kind, pages or message)."""
-    request = {"path": str(path.resolve()), "sys_path": sys.path}
+    request = {"path": str(path.resolve()), "sys_path": sys.path, "seconds": MOST_SECONDS}
     try:
         done = subprocess.run(
             [sys.executable, "-c", _CODE, json.dumps(request)],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
-            timeout=MOST_SECONDS,
+            timeout=LONGEST_WAIT_S,
             check=False,
         )
+    except subprocess.TimeoutExpired:
+        return SLOW, None
+    except OSError:
+        return DAMAGED, None
+    if done.returncode == ENDED_BY_CPU_LIMIT:
+        return SLOW, None
+    try:
         kind, answer = json.loads(done.stdout)
-    except (subprocess.TimeoutExpired, OSError, ValueError):
+    except ValueError:
         return DAMAGED, None
     return kind, answer
 
@@ -84,7 +100,8 @@ def main(request):
         import resource
 
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY_LIMIT, MEMORY_LIMIT))
-        resource.setrlimit(resource.RLIMIT_CPU, (MOST_SECONDS, MOST_SECONDS))
+        limit = request["seconds"]
+        resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 1))
     try:
         answer = _answer(request["path"])
     except Exception as error:
