@@ -68,6 +68,7 @@ def main(arguments=None):
     speak()
     with _translate_argparse(words_of_run()):
         options = _options(arguments)
+        options.arguments = sys.argv[1:] if arguments is None else list(arguments)
         if options.command is None:
             options.shown.print_help()
             return 0

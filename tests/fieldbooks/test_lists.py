@@ -1,6 +1,7 @@
 """`tankcal import` of a technician's own list. The truth is the job whose points the list has."""
 
 import json
+import shlex
 import sys
 
 import pytest
@@ -206,4 +207,18 @@ def test_import_outside_a_job_needs_a_folder(tmp_path, capsys, monkeypatch):
     source.write_text("point,x_m,y_m,z_m\nP1,1,2,3\n", encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     assert main(["import", str(source)]) == 2
-    assert "--out" in capsys.readouterr().err
+    assert f"tankcal import {source} --out DIR" in capsys.readouterr().err
+
+
+def test_an_import_without_a_job_prints_the_command_to_repeat(tmp_path, capsys, monkeypatch):
+    source = tmp_path / "my list.csv"
+    source.write_text("point,x_m,y_m,z_m\nP1,1,2,3\n", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    assert main(["import", source.name, "--out", "T 1", "--table", "points"]) == 0
+    lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
+    new, again = (
+        shlex.split(line) for line in lines if line.startswith(("tankcal new", "tankcal import"))
+    )
+    assert again == ["tankcal", "import", source.name, "--table", "points", "--out", new[2]]
+    assert main(new[1:]) == 0
+    assert main(again[1:]) == 0

@@ -235,6 +235,15 @@ def test_without_courses(folder, capsys):
     assert "--courses" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("kind", ["horizontal", "sphere"])
+def test_a_solid_that_cannot_be_read_asks_for_no_courses(kind, tmp_path, capsys):
+    (tmp_path / "old.csv").write_text("height_cm,volume_l\n0,0\n50,1000\n100,900\n150,5000\n")
+    assert main(["read-table", str(tmp_path / "old.csv"), "--kind", kind]) == 2
+    complaint = capsys.readouterr().err
+    assert "old.csv" in complaint
+    assert "--courses" not in complaint
+
+
 @pytest.mark.parametrize("low", [None, 0, 2, 3])
 def test_seams_of_courses_that_do_not_fit_are_told(low, tmp_path, capsys):
     """Simulated: five courses of 2.4 m; two neighbours are declared as 1.9 and 2.9 m."""

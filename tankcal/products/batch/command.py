@@ -1,7 +1,6 @@
 """`tankcal batch`: computation of many jobs, by dask workers or one after the other."""
 
 import shlex
-import sys
 from pathlib import Path
 
 from tankcal.errors import TankcalError, problem_from
@@ -138,7 +137,7 @@ def _batch(options):
             message(
                 "batch_stopped",
                 "stopped; finished jobs are kept; continue with: {command}",
-                command=" ".join(["tankcal", *map(shlex.quote, sys.argv[1:])]),
+                command=shlex.join(["tankcal", *options.arguments]),
             )
         )
         return signal_status(stop)

@@ -138,7 +138,7 @@ def _import(options):
     prepare_for_small_work()
     from tankcal.terminal.input_language import read_job_language
 
-    options.out = options.out or _folder_here()
+    options.out = options.out or _folder_here(options.names)
     folder = Path(options.out)
     has_job = (folder / SETTINGS_FILE).is_file()
     speak(options.language or (read_job_language(folder) if has_job else None))
@@ -173,7 +173,7 @@ def _import(options):
         say(line)
     warn(result.warnings)
     survey = "total-station" if options.no_hits else "wall-hits"
-    _say_written(folder, result.paths, survey)
+    _say_written(options, result.paths, survey)
     return None
 
 
@@ -187,11 +187,15 @@ def _print_machine(summary, warnings, paths):
     )
 
 
-def _folder_here():
-    """Return the current folder if it is a job."""
+def _folder_here(names):
+    """Return the current folder if it is a job; else name the command that imports the files."""
     if Path(SETTINGS_FILE).is_file():
         return "."
-    text = message("import_without_out", "expected --out DIR, the folder of the job")
+    text = message(
+        "import_without_out",
+        "missing; expected the folder of the job: tankcal import {names} --out DIR",
+        names=" ".join(map(_quote_path, names)),
+    )
     raise InputError(Problem("--out", text))
 
 
@@ -278,7 +282,7 @@ def _import_list(foreign_list, options):
     if options.machine:
         _print_machine(lines, foreign_list.warnings, paths)
         return 0
-    _say_written(folder, paths, None)
+    _say_written(options, paths, None)
     return 0
 
 
@@ -338,17 +342,18 @@ def _answer(prompt):
         return "no"
 
 
-def _say_written(folder, paths, survey):
+def _say_written(options, paths, survey):
     """Print the written files and the next command."""
+    folder = Path(options.out)
     say(message("import_wrote", "wrote into {folder}:", folder=str(folder)))
     for path in paths:
         print(f"  {printable(path)}")
-    _say_next(folder, survey)
+    _say_next(options, survey)
 
 
-def _say_next(folder, survey):
+def _say_next(options, survey):
     """Print the next commands; a folder without job.toml is not yet a job."""
-    job = folder
+    folder = job = Path(options.out)
     if not (folder / "job.toml").is_file():
         job = folder.parent / f"{folder.resolve().name or 'tank'}-job"
         text = message(
@@ -361,7 +366,11 @@ def _say_next(folder, survey):
         say(text)
         survey_option = "" if survey is None else f" --survey {survey}"
         print(f"  tankcal new {_quote_path(job)}{survey_option}")
-        print(f"  tankcal import ... --out {_quote_path(job)}")
+        words = list(options.arguments)
+        if "--out" in words:
+            at = words.index("--out")
+            del words[at : at + 2]
+        print(f"  {printable(shlex.join(['tankcal', *words, '--out', str(job)]))}")
     say(message("import_next", "then"))
     print(f"  tankcal run {_quote_path(job)}")
 

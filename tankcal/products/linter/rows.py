@@ -201,7 +201,7 @@ def _has_clear_units(checked_table, declared, log):
         return True
     expected = message(
         "former_no_units",
-        "the headings name no units, and {count} would make a tank of this table; expected "
+        "the headings name no units, and {count} pairs of units give a usual tank; expected "
         "height_unit and volume_unit in former.toml",
         count=len(likely),
     )

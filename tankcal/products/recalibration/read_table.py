@@ -107,7 +107,7 @@ def read_table(
     log = Log()
     former = _read_former(path, former_toml, log)
     kind = kind or (former.kind if former else None) or "vertical"
-    if former is not None and kind in SOLIDS:
+    if kind in SOLIDS:  # no courses are needed, whether or not the table can be read
         log.stop_if_problems()
         return _read_solid(former, kind)
     if former is not None and former.record is not None:
