@@ -21,6 +21,7 @@ from tankcal.text.time_left import describe_progress
 RECORD = "record.json"
 # Allocations between garbage collections; many, because objects of modules are permanent
 OBJECTS_AT_ONCE = 10_000
+LEAST_MEMORY_B = 512 << 20  # address space; below about 450 MB OpenBLAS may hang while it loads
 _LOCALE = ("LC_ALL", "LC_MESSAGES", "LANG")  # in order of priority
 TO_THE_END = "\x1b[K"  # control sequence: clear the rest of the line
 _spoken = {}  # words of the current language; empty: the English of the messages
@@ -104,7 +105,19 @@ def read_job(source, show, **options):
 
 
 def prepare_for_small_work():
-    """Limit BLAS to one thread and collect garbage less often, which is faster here."""
+    """Limit BLAS to one thread and collect garbage less often, which is faster here.
+
+    Raises
+    ------
+    MemoryError
+        If the limit of address space is below `LEAST_MEMORY_B`.
+    """
+    with suppress(ImportError):  # Windows has neither the module nor this limit
+        import resource
+
+        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+        if limit not in (resource.RLIM_INFINITY, -1) and limit < LEAST_MEMORY_B:
+            raise MemoryError
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     gc.set_threshold(OBJECTS_AT_ONCE)
 

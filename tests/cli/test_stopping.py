@@ -131,17 +131,19 @@ def test_runs_that_are_ended_lose_nothing_study(job):
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of memory are Linux's here")
 def test_too_little_memory_is_told_in_a_line(tmp_path):
-    """At every limit either the whole results or one line; what the typesetter needs is one too."""
+    """At every limit either complete results or one line.
+
+    With 200 and 350 MB OpenBLAS would repeat its request for memory for ever while it is loaded.
+    """
     folder = write_job(tmp_path / "job")
     import resource
 
     ends = set()
-    for limit_mb in (420, 450, 480, 1200):
+    for limit_mb in (60, 200, 350, 500, 520, 650, 1200):
         shutil.rmtree(folder / "results", ignore_errors=True)
         done = subprocess.run(
             [sys.executable, "-m", "tankcal", "run", str(folder), "--quiet"],
             capture_output=True, text=True, timeout=200, check=False,
-            env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit_mb << 20,) * 2),  # noqa: B023
         )  # fmt: skip
         ends.add(done.returncode)
@@ -151,8 +153,7 @@ def test_too_little_memory_is_told_in_a_line(tmp_path):
             assert not (folder / "results").exists()
         else:
             assert (folder / "results" / "report.pdf").is_file()
-    assert 0 in ends
-    assert ends <= {0, 1, 2}  # 1: OpenBLAS itself gives up, in a line of its own
+    assert ends == {0, 2}
 
 
 @pytest.mark.parametrize(
