@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from jacobians import assert_derivative
+from page_figures import agree, figures_of
 from scipy.special import ellipe
 
 from tankcal.geometry.great_ellipses import (
@@ -191,6 +192,12 @@ def test_intervals_of_random_ellipsoids(figure):
 @pytest.mark.study
 def test_intervals_of_ten_thousand_random_ellipsoids(figure):
     held = random_intervals(np.random.default_rng(2552), THREE, 10_000, 0.005).mean()
+    axes, sd_mm, stated = figures_of(
+        "docs/spheres.md",
+        "(axes within () %), with three perpendicular circles and () mm, 95 % intervals held () %",
+    )
+    assert (axes, sd_mm) == ("0.1", "5")
+    assert agree([100 * held], [stated])
     figure("three circles of 10 000 random ellipsoids: held", f"{held:.4f}")
     assert 0.945 <= held <= 0.955
 

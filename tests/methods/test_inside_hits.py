@@ -6,6 +6,7 @@ from generated_hits import Tool, observe
 from generated_inside import HEIGHT_M, parts_of
 from generated_solids import FULL_TURN, Ball, LyingShell
 from job_builder import write_folder
+from page_figures import figures_of
 
 import tankcal
 from tankcal.errors import InputError
@@ -191,6 +192,11 @@ def test_intervals_hold_on_walls_that_are_not_the_model(kind, tmp_path, figure):
     wide = expanded[:, -1].mean() / 1.96 / np.sqrt(np.mean(error[:, -1] ** 2))
     figure(f"inside hits, {kind}: held total, rows", f"{held[:, -1].mean():.3f} {held.mean():.3f}")
     figure(f"inside hits, {kind}: mean U of totals over 1.96 rms errors", f"{wide:.2f}")
+    least, count = figures_of(
+        "docs/wall-hits.md", "At least () of the totals and of the rows of () tanks of each kind"
+    )
+    assert float(least) == LEAST_HELD
+    assert int(count) == len(found)
     assert held[:, -1].mean() >= LEAST_HELD
     assert held.mean() >= LEAST_HELD
 

@@ -9,6 +9,7 @@ import pytest
 from conftest import EXAMPLE
 from draws import draws
 from generated_solids import SPHERES, make_sphere
+from page_figures import figures_of, shares_agree
 from strapped_balls import strapped_job
 
 from tankcal.methods.great_circles.sphere import find_strapped_sphere
@@ -72,6 +73,10 @@ def test_intervals_hold_on_strapped_spheres(figure):
 @pytest.mark.study
 def test_intervals_hold_on_strapped_spheres_study(figure):
     held = study(draws(10, 150), figure, 17)
+    *stated, full = figures_of(
+        "docs/spheres.md", "held () of the totals and () of the rows of () spheres"
+    )
+    assert shares_agree([held[:, -1].mean(), held.mean()], stated, len(held), int(full))
     least = LEAST_HELD - 3 * np.sqrt(0.95 * 0.05 / len(held))
     assert held[:, -1].mean() > least
     assert held.mean() > least

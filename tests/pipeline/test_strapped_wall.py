@@ -7,6 +7,7 @@ import pytest
 from generated_strapping import girth_of, strapped_job
 from generated_walls import GeneratedWall, make_wall
 from job_builder import S_1, strapped_parts, write_book, write_folder, write_strapped_job
+from page_figures import figures_of
 
 import tankcal
 from tankcal.errors import InputError, SolutionError
@@ -283,8 +284,19 @@ def test_sound_courses_are_seldom_asked_whether_they_were_exchanged():
         outside[[1, 4]] = outside[[4, 1]]
         found = exchanged_courses(outside, plates, range(6))
         named += found is not None and found[:2] in [(1, 4), (1, 5)]
-    assert told <= 4
-    assert named >= 95
+    most, scatter_mm = figures_of(
+        "docs/strapping.md",
+        "For valid books it asks in at most () % (radii of courses that scatter by up to () mm",
+    )
+    small_mm, least, first, other = figures_of(
+        "docs/strapping.md",
+        "Where courses scatter by up to () mm, it finds at least () % of exchanges of plates of () "
+        "and () mm",
+    )
+    assert (float(scatter_mm), float(small_mm)) == (1.2, 0.4)
+    assert [float(first), float(other)] == pytest.approx(1000 * plates[[1, 4]])
+    assert told <= float(most)
+    assert named >= float(least)
 
 
 def test_a_temperature_in_fahrenheit_is_named(tmp_path):

@@ -19,6 +19,7 @@ from generated_tangents import (
     traverse_tables,
 )
 from job_builder import tangent_parts, write_book, write_folder
+from page_figures import figures_of
 
 import tankcal
 from tankcal.errors import InputError, SolutionError
@@ -106,6 +107,13 @@ def test_exact_tangents_give_the_table(tmp_path, radius, figure):
     off = result.table.volume_m3[-1] / inside_of(radius) - 1
     figure(f"volume by exact tangents, {radius.__name__}", f"{1e6 * off:+.2f} ppm")
     mean, common = result.touching.hull.excess_m.mean(), result.touching.hull.common_sd_m.mean()
+    radius_m, ppm, _, ppm_of_oval = figures_of(
+        "docs/tangents.md",
+        "a leaning circle of () m is reproduced within () ppm of its volume, an oval of () mm "
+        "within () ppm",
+    )
+    assert float(radius_m) == 6.5
+    assert abs(off) < 1e-6 * float(ppm if radius is circle else ppm_of_oval)
     assert abs(off) < 5e-7 + 2 * (2 * common) / 6.5
     assert mean < 5e-5
     assert len(result.accepted) == 128

@@ -10,6 +10,7 @@ import pytest
 import scipy.sparse
 from generated_hits import Surface, Tool, even_aims, take_hits
 from job_builder import hit_parts, write_folder
+from page_figures import figures_of, value_of
 
 import tankcal
 from tankcal.geometry.field.amplitudes import Amplitudes
@@ -128,7 +129,15 @@ def test_offset_and_radius_of_the_field_page(
     """Page of worked numbers, section 3: one set-up in the middle; set-ups outside, 6 m from the
     wall, whose distance from the axis is known to 0.15 mm; a strap of level 1.
     """
+    *sizes, offset_mm, alone, with_strap, with_outside = map(value_of, figures_of(
+        "docs/wall-hits.md",
+        "(() levels of () hits, offset known to () mm) it is (), with a strap (), and with set-ups "
+        "outside ()",
+    ))  # fmt: skip
+    stated = {(False, False): alone, (False, True): with_strap, (True, False): with_outside}
+    assert r == stated.get((outside, strapped), r)
     sides, levels, count = 1 + outside, 10, 24
+    assert [*sizes, offset_mm] == [levels, count, 1.5]
     n = sides * levels * count
     level = np.tile(np.repeat(np.arange(levels), count), sides)
     azimuth = np.tile(2 * np.pi * np.arange(count) / count, sides * levels)

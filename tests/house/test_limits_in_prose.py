@@ -1,0 +1,363 @@
+"""Limits and defaults in running text: each is a constant of the code, with its unit."""
+
+import math
+import re
+import tomllib
+
+import pytest
+from page_figures import agree, figures_of
+from page_sessions import ROOT
+
+from tankcal import units
+from tankcal.geometry.field.components import COMPONENTS
+from tankcal.geometry.field.places import OF_GREAT_CIRCLES, OF_SPHERES
+from tankcal.job import plausibility
+from tankcal.job.checks import obstructions, tiny_sds
+from tankcal.job.checks.settings import MAX_TABLE_ROWS
+from tankcal.job.checks.survey import instruments
+from tankcal.methods.great_circles import sphere as circles
+from tankcal.methods.hits import wall as hits_wall
+from tankcal.methods.hits import warnings as hits_warnings
+from tankcal.methods.inside_hits import solid as inside_solid
+from tankcal.methods.lines import departures
+from tankcal.methods.lines import warnings as lines_warnings
+from tankcal.methods.strapping import tape_warnings
+from tankcal.pipeline.solids import scan
+from tankcal.pipeline.wall_straps import typical_shape_m
+from tankcal.products.linter import totals
+from tankcal.record.columns import MOST_ROWS
+from tankcal.report import attachments, letterhead
+from tankcal.report.survey import quality
+from tankcal.report.web import calculator_data
+from tankcal.survey import strapping, untied
+
+MM, PERCENT, PPM = 1e3, 100, 1e6
+
+
+def page_constant(name):
+    """A number of rows in the template of the pages."""
+    text = (ROOT / "report_templates/page.typ").read_text(encoding="utf-8")
+    return int(re.search(rf"^#let {name} = (\d+)", text, re.MULTILINE)[1])
+
+
+def read_limits(survey):
+    """The limits of a survey."""
+    path = ROOT / "tankcal/pipeline/limits" / f"{survey}.toml"
+    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+COMPONENT = {component.name: component for component in COMPONENTS}
+NOMINAL = read_limits("nominal_size")
+STRAPS, LINES = read_limits("strapping"), read_limits("reference_line")
+HITS, TANGENTS = read_limits("wall_hits"), read_limits("tangents")
+LYING = tomllib.loads((ROOT / "tankcal/methods/inside_hits/limits.toml").read_text("utf-8"))
+ONE_IN_500 = (1, 1 / NOMINAL["share"])
+
+# (page, sentence with () for each figure, figures in the unit of the sentence)
+LIMITS = [
+    (
+        "docs/start.md",
+        "blank: () mm for a vertical tank",
+        [MM * typical_shape_m()],
+    ),
+    (
+        "docs/report.md",
+        "at most () kB and () pixels along a side",
+        [letterhead.MAX_LOGO_BYTES / 1000, letterhead.MAX_LOGO_PIXELS],
+    ),
+    ("docs/report.md", "A table of up to () rows is not divided", [page_constant("short")]),
+    ("docs/report.md", "Tables end after () rows", [quality.MOST_ROWS]),
+    (
+        "docs/report.md",
+        "at most about twice this value (() mL if the largest u is () m³)",
+        [2e6 * calculator_data.BEND, 1],
+    ),
+    (
+        "docs/report.md",
+        "unless a file is larger than () MB (`record_tables.npz`: () MB)",
+        [attachments.LARGEST / 1e6, attachments.LARGEST_PACKED / 1e6],
+    ),
+    ("docs/results.md", "with more than () rows", [MOST_ROWS]),
+    ("docs/table.md", "A table has at most () rows", [MAX_TABLE_ROWS]),
+    ("docs/table.md", "| 1/8 in = () m exactly |", [units.INCH_M / 8]),
+    ("docs/table.md", "| 1/16 in = () m exactly |", [units.INCH_M / 16]),
+    ("docs/table.md", "(42 US gallons = () m³ exactly)", [42 * 231 * units.INCH_M**3]),
+    (
+        "docs/table.md",
+        "ends () mm or more below it, if this is a step or more than () mm",
+        [MM * totals._LEAST_GAP_M, MM * totals._USUAL_GAP_M],
+    ),
+    (
+        "docs/table.md",
+        "more than () % from nominal; a power of ten is named | more than () % from "
+        "`--nominal-diameter` and `--nominal-height`, or () % from `--nominal-volume`; without "
+        "either, a cylinder more than () times as wide as high, or () times as high as wide",
+        [
+            PERCENT * totals._FAR,
+            PERCENT * totals._CLOSE_DIAMETER,
+            PERCENT * totals._CLOSE_VOLUME,
+            totals._FLATTEST,
+            1 / totals._SLIMMEST,
+        ],
+    ),
+    (
+        "docs/strapping.md",
+        "If it is blank for a vertical tank, () mm is assumed",
+        [MM * typical_shape_m()],
+    ),
+    ("docs/strapping.md", "The default of () mm is not taken", [MM * typical_shape_m()]),
+    (
+        "docs/strapping.md",
+        "pull, assumed ± () %; friction, assumed ± () % of its value",
+        [PERCENT * strapping.TENSION_SHARE, PERCENT * strapping.FRICTION_SHARE],
+    ),
+    (
+        "docs/strapping.md",
+        "weight per metre, assumed ± () %",
+        [PERCENT * strapping.WEIGHT_SHARE],
+    ),
+    (
+        "docs/strapping.md",
+        "with a measured temperature, assumed ± () K",
+        [strapping.TAPE_TEMPERATURE_K],
+    ),
+    (
+        "docs/strapping.md",
+        "an `s_mm` below () mm, which is probably in metres (below () mm it asks",
+        [tiny_sds.SURE["s_mm"], tiny_sds.LEAST["s_mm"]],
+    ),
+    (
+        "docs/strapping.md",
+        "readings () % off the circumference of the drawing or off the median",
+        [PERCENT * plausibility.IMPOSSIBLE_MISS],
+    ),
+    (
+        "docs/strapping.md",
+        "a certified temperature outside () to () °C",
+        tape_warnings.CERTIFIED_C,
+    ),
+    (
+        "docs/strapping.md",
+        "a correction of more than () ppm (a tape of class II of OIML R 35 is off by () mm and "
+        "() mm per metre at most)",
+        [STRAPS["most_correction_ppm"], *STRAPS["class_ii"].values()],
+    ),
+    (
+        "docs/strapping.md",
+        "`correction_mm` and `correction` that together exceed () ppm",
+        [STRAPS["most_correction_ppm"]],
+    ),
+    (
+        "docs/strapping.md",
+        "(over () ppm the program asks)",
+        [STRAPS["most_correction_ppm"]],
+    ),
+    (
+        "docs/strapping.md",
+        "tapes over () K from the temperature of the table",
+        [STRAPS["shell_unlike_tape_k"]],
+    ),
+    (
+        "docs/strapping.md",
+        "more butt straps, laps or welds than one per () m",
+        [obstructions.LEAST_PLATE_M],
+    ),
+    ("docs/strapping.md", "and caps over () mm", [obstructions.THICK_WELD_MM]),
+    (
+        "docs/strapping.md",
+        "than chance explains (under () %)",
+        [PERCENT * tape_warnings.BY_CHANCE],
+    ),
+    ("docs/strapping.md", "the nominal radius is missed by () in ()", ONE_IN_500),
+    (
+        "docs/strapping.md",
+        "a course differs from the others by () in ()",
+        [1, 2 / NOMINAL["share"]],
+    ),
+    (
+        "docs/wall-hits.md",
+        "Hits within () mm of a weld of `welds.csv` are left out",
+        [MM * HITS["weld_distance_m"]],
+    ),
+    (
+        "docs/wall-hits.md",
+        "until no hit moves by () mm (one or two passes)",
+        [MM * hits_wall.SETTLED_M],
+    ),
+    (
+        "docs/wall-hits.md",
+        "an `s_mm` or `s_arcsec` below (), which is probably in metres or degrees (below () it",
+        [tiny_sds.SURE["s_arcsec"], tiny_sds.LEAST["s_arcsec"]],
+    ),
+    (
+        "docs/wall-hits.md",
+        "a control target that moved (() mm and () gon, or more",
+        [HITS["control_distance_mm"], HITS["control_angle_gon"]],
+    ),
+    (
+        "docs/wall-hits.md",
+        "an offset of over () mm that only straps determine",
+        [HITS["most_offset_mm"]],
+    ),
+    ("docs/wall-hits.md", "departs from the nominal radius by more than () in ()", ONE_IN_500),
+    (
+        "docs/wall-hits.md",
+        "had moved by () mm or more. Waves 2 to 8 of the wall (() mm each)",
+        [MM * hits_warnings.MOVED_M, MM * hits_warnings.WAVE_M],
+    ),
+    (
+        "docs/wall-hits.md",
+        "whose distances are all () mm or more too long or too short",
+        [MM * hits_warnings.MOVED_M],
+    ),
+    (
+        "docs/wall-hits.md",
+        "a `correction` of over () ppm",
+        [PPM * instruments.DOUBTFUL_CORRECTION],
+    ),
+    (
+        "docs/wall-hits.md",
+        "until no distance from the solid changes by () mm",
+        [MM * inside_solid.SETTLED_M],
+    ),
+    (
+        "docs/wall-hits.md",
+        "over () % of the radius plus () mm off the wall",
+        [PERCENT * scan.NEVER_PART, MM * scan.NEVER_M],
+    ),
+    (
+        "docs/wall-hits.md",
+        "a set-up with over () % of its hits rejected; - hits on less than () % of the length",
+        [PERCENT * LYING["most_rejected_share"], PERCENT * LYING["least_length_share"]],
+    ),
+    (
+        "docs/wall-hits.md",
+        "counts with at least its prior median of () mm",
+        [MM * COMPONENT["common ovality"].median_m],
+    ),
+    (
+        "docs/wall-hits.md",
+        "do not settle within () mm in four passes",
+        [MM * hits_wall.UNSETTLED_M],
+    ),
+    (
+        "docs/wall-hits.md",
+        "if the other order fits () or () times better",
+        [untied.MIRRORED, untied.EXCHANGED],
+    ),
+    (
+        "docs/tangents.md",
+        "Tangents within () mm of a weld of `welds.csv` are left out",
+        [MM * HITS["weld_distance_m"]],
+    ),
+    (
+        "docs/tangents.md",
+        "with more than () of its amplitude, if a level",
+        [TANGENTS["wave_in_radius"]],
+    ),
+    (
+        "docs/tangents.md",
+        "an `s_arcsec` below (), which is probably in degrees (below () it asks",
+        [tiny_sds.SURE["s_arcsec"], tiny_sds.LEAST["s_arcsec"]],
+    ),
+    (
+        "docs/tangents.md",
+        "touches the wall more than () m from its level",
+        [TANGENTS["level_m"]],
+    ),
+    ("docs/tangents.md", "departs from the nominal radius by more than () in ()", ONE_IN_500),
+    (
+        "docs/tangents.md",
+        "The limit is () mm, or three standard deviations",
+        [TANGENTS["base_mm"]],
+    ),
+    (
+        "docs/rings.md",
+        "repeats that differ by more than () mm",
+        [STRAPS["repeats_lying"][0]["limit_mm"]],
+    ),
+    ("docs/rings.md", "of repeats over () mm", [STRAPS["repeats_lying"][0]["limit_mm"]]),
+    (
+        "docs/rings.md",
+        "the () mm are from a secondary source",
+        [STRAPS["repeats_lying"][0]["limit_mm"]],
+    ),
+    (
+        "docs/spheres.md",
+        "by default () % of the radius. Evenly",
+        [PERCENT * circles.OVALITY_SHARE],
+    ),
+    (
+        "docs/spheres.md",
+        "- slow waves l⁻³ of () mm; - plates and seams of () and () m of () mm each; - a band of "
+        "() mm at the equator",
+        [
+            MM * OF_GREAT_CIRCLES[0].median_m,
+            OF_GREAT_CIRCLES[1].width_m,
+            OF_GREAT_CIRCLES[2].width_m,
+            MM * OF_GREAT_CIRCLES[2].median_m,
+            MM * OF_GREAT_CIRCLES[3].median_m,
+        ],
+    ),
+    (
+        "docs/spheres.md",
+        "(inside for outside) or by more than () %",
+        [PERCENT * NOMINAL["share"]],
+    ),
+    (
+        "docs/spheres.md",
+        "with a prior of () mm, uncertain by a factor of ()",
+        [MM * OF_SPHERES[3].median_m, math.exp(OF_SPHERES[3].log_sd / 2)],
+    ),
+    (
+        "docs/reference-lines.md",
+        "Beyond (), which chance exceeds in () %",
+        [lines_warnings.CRITICAL_LEAN, PERCENT * math.exp(-(lines_warnings.CRITICAL_LEAN**2) / 2)],
+    ),
+    (
+        "docs/reference-lines.md",
+        'of () mm/m (()"), by which two verticals may differ',
+        [MM * lines_warnings.VERTICALS, 3600 * math.degrees(lines_warnings.VERTICALS)],
+    ),
+    (
+        "docs/reference-lines.md",
+        "If more than () % of the offsets, on more than half",
+        [PERCENT * lines_warnings.MANY],
+    ),
+    (
+        "docs/reference-lines.md",
+        "asks about an `s_mm` below () mm and refuses an `s_mm` below () mm",
+        [tiny_sds.LEAST["s_mm"], tiny_sds.SURE["s_mm"]],
+    ),
+    (
+        "docs/reference-lines.md",
+        "contradicts the lines by more than () mm of radius",
+        [MM * lines_warnings.OFF_LEVEL_M],
+    ),
+    ("docs/reference-lines.md", "a lean of more than () %", [PERCENT * LINES["most_lean"]]),
+    ("docs/reference-lines.md", "a tank of less than () m", [LINES["least_diameter_m"]]),
+    (
+        "docs/reference-lines.md",
+        "of all others by over () mm and by five times",
+        [MM * departures.APART_M],
+    ),
+    (
+        "docs/reference-lines.md",
+        "by () standard deviations less than all of them",
+        [departures.SURE_SDS],
+    ),
+    (
+        "docs/reference-lines.md",
+        "offsets that are all under () mm",
+        [LINES["least_offset_mm"]],
+    ),
+    ("docs/reference-lines.md", "which shows errors of () in () of the drawing", ONE_IN_500),
+]
+
+
+@pytest.mark.parametrize(
+    ("page", "sentence", "values"), LIMITS, ids=lambda item: item if isinstance(item, str) else ""
+)
+def test_a_limit_in_the_text_is_that_of_the_code(page, sentence, values):
+    printed = figures_of(page, sentence)
+    assert agree(values, printed), (printed, values)
