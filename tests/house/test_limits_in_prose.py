@@ -24,12 +24,27 @@ from tankcal.methods.lines import warnings as lines_warnings
 from tankcal.methods.strapping import tape_warnings
 from tankcal.pipeline.solids import scan
 from tankcal.pipeline.wall_straps import typical_shape_m
+from tankcal.products.gauge import deviation
+from tankcal.products.gauge import reading as gauge
+from tankcal.products.inspection import boards
 from tankcal.products.linter import totals
+from tankcal.products.quantity import reading as quantity
+from tankcal.products.recalibration import (
+    basis,
+    comparison,
+    read_table,
+    solid_geometry,
+    verdict,
+)
 from tankcal.record.columns import MOST_ROWS
 from tankcal.report import attachments, letterhead
+from tankcal.report.inspection import paper as inspection_paper
 from tankcal.report.survey import quality
 from tankcal.report.web import calculator_data
 from tankcal.survey import strapping, untied
+from tankcal.tank import gauging
+from tankcal.tank.volume_correction.brazil import Brazil
+from tankcal.tank.volume_correction.petroleum import Petroleum
 
 MM, PERCENT, PPM = 1e3, 100, 1e6
 
@@ -352,6 +367,132 @@ LIMITS = [
         [LINES["least_offset_mm"]],
     ),
     ("docs/reference-lines.md", "which shows errors of () in () of the drawing", ONE_IN_500),
+]
+
+
+U_OF_TICKET, U_OF_GAUGE = gauging.UNCERTAINTIES, gauge.UNCERTAINTIES
+LIMITS += [
+    ("docs/ticket.md", "| `u_dip_mm` | (), of each dip |", [U_OF_TICKET["u_dip_mm"]]),
+    ("docs/ticket.md", "| `u_tape_ppm` | (), of the length read |", [U_OF_TICKET["u_tape_ppm"]]),
+    (
+        "docs/ticket.md",
+        "| `u_water_dip_mm` | (), of each water dip |",
+        [U_OF_TICKET["u_water_dip_mm"]],
+    ),
+    (
+        "docs/ticket.md",
+        "| `u_temperature_k` | (), of the mean temperature",
+        [U_OF_TICKET["u_temperature_k"]],
+    ),
+    ("docs/ticket.md", "| `u_thermometer_k` | (), common", [U_OF_TICKET["u_thermometer_k"]]),
+    ("docs/ticket.md", "| `u_ambient_k` | (), common", [U_OF_TICKET["u_ambient_k"]]),
+    ("docs/ticket.md", "| `u_density_kg_m3` | () |", [U_OF_TICKET["u_density_kg_m3"]]),
+    ("docs/ticket.md", "| `u_sw_percent` | (), if S&W", [U_OF_TICKET["u_sw_percent"]]),
+    (
+        "docs/ticket.md",
+        "| by distance from the base: () % at () K, () % at () K |",
+        [
+            PERCENT * float(gauging.assumed_u_vcf(42.0, 20.0)),
+            22,
+            PERCENT * float(gauging.assumed_u_vcf(70.0, 20.0)),
+            50,
+        ],
+    ),
+    (
+        "docs/ticket.md",
+        "temperature in degrees Fahrenheit | warning above () °C for a light product",
+        [quantity.HOTTEST_C],
+    ),
+    ("docs/ticket.md", "S&W as a fraction | warning below () %", [quantity.LEAST_SW_PERCENT]),
+    (
+        "docs/ticket.md",
+        "differs from the table by more than () mm",
+        [MM * quantity.MOST_REFERENCE_SHIFT_M],
+    ),
+    (
+        "docs/ticket.md",
+        "`CNP-6-70` differs from D1250 at 20 °C: by () % for gasoline of () kg/m³ at () °C",
+        [
+            PERCENT
+            * abs(
+                Brazil(is_rounded=False).factor(740.0, 30.0)
+                / Petroleum(2004, "products", "20C").factor(740.0, 30.0)
+                - 1
+            ),
+            740,
+            30,
+        ],
+    ),
+    ("docs/gauge.md", "| `u_dip_mm` | (), of a single dip", [U_OF_GAUGE["u_dip_mm"]]),
+    ("docs/gauge.md", "| `u_gauge_mm` | (), of the indication", [U_OF_GAUGE["u_gauge_mm"]]),
+    ("docs/gauge.md", "| `u_tape_zero_mm` | (), common", [U_OF_GAUGE["u_tape_zero_mm"]]),
+    ("docs/gauge.md", "| `u_tape_ppm` | (), common", [U_OF_GAUGE["u_tape_ppm"]]),
+    (
+        "docs/gauge.md",
+        "| `u_tape_temperature_k` | (), common",
+        [U_OF_GAUGE["u_tape_temperature_k"]],
+    ),
+    (
+        "docs/gauge.md",
+        "| `u_reference_mm`, `u_table_reference_mm` | () |",
+        [U_OF_GAUGE["u_reference_mm"]],
+    ),
+    (
+        "docs/gauge.md",
+        "| `u_dip_plate_mm`, `u_table_zero_mm` | (), of `[zeros]`",
+        [U_OF_GAUGE["u_dip_plate_mm"]],
+    ),
+    ("docs/gauge.md", "| `u_movement_percent` | (), of h", [U_OF_GAUGE["u_movement_percent"]]),
+    (
+        "docs/gauge.md",
+        "1/cos t - 1, which is () mm/m at ()°",
+        [MM * (1 / math.cos(math.radians(1)) - 1), 1],
+    ),
+    (
+        "docs/gauge.md",
+        "If its probability is at least () %, both are pooled. The declared variance has () "
+        "degrees of freedom (known to about () %",
+        [
+            PERCENT * deviation.LEAST_PROBABILITY,
+            deviation.SCATTER_DOF,
+            PERCENT / math.sqrt(2 * deviation.SCATTER_DOF),
+        ],
+    ),
+    ("docs/gauge.md", "Below () %, the residuals alone", [PERCENT * deviation.LEAST_PROBABILITY]),
+    (
+        "docs/read-table.md",
+        "deviate by more than () % of the highest volume",
+        [PERCENT * read_table.WORST_FIT],
+    ),
+    (
+        "docs/read-table.md",
+        "if diameters that differ by more than () % explain them",
+        [PERCENT * (solid_geometry.LARGEST_RATIO - 1)],
+    ),
+    (
+        "docs/compare.md",
+        "Tables whose volumes differ by more than () % at the highest",
+        [PERCENT * comparison.MOST_APART],
+    ),
+    ("docs/compare.md", "a difference of over () mm and three u", [MM * comparison.LEAST_ZERO_M]),
+    ("docs/compare.md", "(() mm without a limit)", [MM * verdict.USUAL_LIMIT_M]),
+    ("docs/compare.md", "Less than () mm, or two u, counts", [MM * basis.LEAST_ZERO_M]),
+    (
+        "docs/compare.md",
+        "For example, 0.70, 0.46 and 0.60 m³ give () with c = 0 and () with 0.5",
+        [0.70 / math.sqrt(0.46**2 + 0.60**2 - 2 * c * 0.46 * 0.60) for c in (0.0, 0.5)],
+    ),
+    (
+        "docs/inspection.md",
+        "gap under a board of () mm centred on a vertical or a horizontal weld: the largest gap "
+        "within () mm",
+        [MM * boards.BOARD_M, MM * boards.REACH_M],
+    ),
+    (
+        "docs/inspection.md",
+        "Above () % it is printed as > () %",
+        [PERCENT * inspection_paper._SURE, PERCENT * inspection_paper._SURE - 0.05],
+    ),
 ]
 
 

@@ -9,6 +9,7 @@ import sys
 import numpy as np
 import openpyxl
 import pytest
+from page_figures import agree, figures_of, value_of
 from scipy import stats
 
 from tankcal.cli import main
@@ -265,6 +266,15 @@ def test_coverage_of_a_sticking_gauge(levels, repeats, tmp_path, figure):
         inside += np.abs(deviation - truth(at)) <= expand(sources, 0.95)[1]
     share = inside / draws
     figure(f"coverage of a sticking gauge, {levels} levels of {repeats}", share.round(3).tolist())
+    stated = {
+        (3, 1): figures_of("docs/gauge.md", "| 3 × 1 | () | () | () |"),
+        (3, 3): figures_of("docs/gauge.md", "| 3 × 3 | () | () | () |"),
+        (6, 2): figures_of("docs/gauge.md", "| 6 × 2 | () | () | () |"),
+        (12, 1): figures_of("docs/gauge.md", "| 12 × 1 | () | () | () |"),
+    }
+    (full,) = figures_of("docs/gauge.md", "() comparisons were simulated")
+    assert value_of(full) == draws
+    assert agree(share, stated[levels, repeats])
     assert share.min() >= 0.94
     assert share.max() <= 0.985
 

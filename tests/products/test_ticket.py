@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import plain_quantity
 import pytest
+from page_figures import agree, figures_of, value_of
 
 from tankcal.cli import main
 from tankcal.errors import InputError
@@ -180,6 +181,16 @@ def test_intervals_of_transfers_hold_study(figure, is_density_shared):
     share = simulate_transfers(count, 2, is_density_shared=is_density_shared)
     density = "shared density" if is_density_shared else "a density of its own in each gauging"
     figure(f"NSV of {count} transfers held, {density}", f"{share:.4f}")
+    full, stated = figures_of(
+        "docs/ticket.md",
+        "Of () simulated transfers, () of the true net standard volumes lie within U (0.95 "
+        "expected, standard error 0.002)",
+    )
+    (own_stated,) = figures_of(
+        "docs/ticket.md", "has an independent error in each gauging, U also holds ():"
+    )
+    assert value_of(full) == count
+    assert agree([share], [stated if is_density_shared else own_stated])
     assert 0.94 <= share <= 0.96
 
 

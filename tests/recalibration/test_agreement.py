@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from page_figures import agree, figures_of, value_of
 from tables_of_s1 import RADII, new_s1, rings_m3
 
 from tankcal.products.recalibration.agreement import (
@@ -64,6 +65,14 @@ def test_one_table_in_twenty_is_beyond_one(share, figure):
     E_n = normalized_error(volumes[:, 1] - volumes[:, 0], K95 * u, K95 * u, c)
     rate = 100 * np.mean(np.abs(E_n) > 1)
     figure(f"|E_n| > 1, c = {c:.2f}", f"{rate:.2f} % of {count}")
+    pairs, *stated = figures_of(
+        "docs/compare.md",
+        "For () pairs of strapped shells with tapes of a common master, |E_n| > 1 occurred in (), "
+        "() and () % (c (), (), ())",
+    )
+    assert value_of(pairs) == count
+    number = (0.0, 0.5, 0.9).index(share)
+    assert agree([rate, c], [stated[number], stated[3 + number]])
     assert 4.5 < rate < 5.5
 
 

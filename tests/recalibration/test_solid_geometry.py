@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from page_figures import figures_of
 
 import tankcal
 from tankcal.errors import InputError
@@ -174,7 +175,11 @@ def test_the_job_gives_the_table_back(kind, tmp_path):
     result = tankcal.run(tankcal.load(tmp_path / "job"))
     new = result.table.volume_m3[: len(dips)]
     assert result.table.height_m[: len(dips)] == pytest.approx(dips, abs=1e-9)
-    assert np.abs(new - former.volume_m3).max() < 0.0006
+    (most_l, quantum_l) = figures_of(
+        "docs/read-table.md", "within its rounding (tests: () L where rows are rounded to () L)"
+    )
+    assert float(quantum_l) == 1000 * former.volume_quantum_m3
+    assert 1000 * np.abs(new - former.volume_m3).max() < float(most_l)
     by_rounding = 2 * np.hypot(fit["diameter"][1] * 2 * new / fit["diameter"][0], 0.001)
     assert np.all(result.table.U_m3[: len(dips)] < by_rounding + 0.001)
     text = (tmp_path / "job" / "job.toml").read_text()

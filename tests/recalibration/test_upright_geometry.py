@@ -3,6 +3,7 @@
 Truth: recalibration.md, section 3 (tank S-1); simulation by numerical integration (former_tables).
 """
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from draws import draws
 from former_tables import SimulatedTank, draw_tank, table_of
 from jacobians import assert_derivative
 from numpy.testing import assert_allclose
+from page_figures import agree, figures_of, value_of
 
 from tankcal.products.recalibration.former import FormerRoof, FormerTable
 from tankcal.products.recalibration.seams import (
@@ -69,8 +71,26 @@ def test_published_example_with_head():
     off = (1e6 * (found.radii_m - radii_of_s1())).round(1)
     assert off.tolist() == [-0.9, -1.7, -3.8, -6.3, -7.3]
     u_density, u_radii = found.independent_u
-    assert (1e6 * u_radii).round().tolist() == [1, 4, 7, 11, 14]
+    printed = figures_of(
+        "docs/read-table.md",
+        "With independent errors it gives (), (), (), (), () µm and () ± () kg/m3, t = ()",
+    )
     density = found.density_kg_m3.value
+    assert agree([*(1e6 * u_radii), density, u_density, density / u_density], printed)
+    assert agree(
+        [found.density_kg_m3.u],
+        figures_of("docs/read-table.md", "The larger of both values is u: () kg/m3 for S-1"),
+    )
+    course_l, step_l, rows = map(
+        value_of,
+        figures_of(
+            "docs/read-table.md",
+            "of a course of () L/cm increase by () L a row and fall back every () rows",
+        ),
+    )
+    assert course_l == pytest.approx(10 * math.pi * radii_of_s1()[0] ** 2, abs=0.2)
+    assert course_l % 1 == pytest.approx(step_l)
+    assert math.floor(1 / step_l) == rows
     assert (round(density, 1), round(u_density, 1), round(density / u_density)) == (852.8, 5.3, 160)
     assert found.head == "with"
     assert round(1000 * found.rms_m3, 2) == 0.28
@@ -81,6 +101,12 @@ def test_published_example_with_its_head_left_out():
     rms, largest, radii = read_upright(table_of_s1(850), HEIGHTS, PLATES).without_head
     assert (1e3 * (radii - radii_of_s1())).round(2).tolist() == [0.16, 0.66, 1.16, 1.70, 2.22]
     assert (round(1000 * rms, 2), round(1000 * largest, 1)) == (1.61, 3.9)
+    printed = figures_of(
+        "docs/read-table.md",
+        "has small residuals (() L of () in tank S-1), but its radii are wrong by () mm",
+    )
+    assert agree([1000 * rms, 1e3 * (radii - radii_of_s1()).max()], printed[::2])
+    assert value_of(printed[1]) == round(1000 * table_of_s1(850).volume_m3[-1], -4)
 
 
 def test_table_without_head_is_told_so():
@@ -91,7 +117,7 @@ def test_table_without_head_is_told_so():
 
 @pytest.mark.parametrize(
     ("step", "quantum", "u_mm"),
-    [(0.01, 0.001, 0.0012), (0.001, 0.001, 0.0004), (0.01, 0.01, 0.012)],
+    [(0.01, 0.001, 0.0012), (0.001, 0.001, 0.0004), (0.01, 0.01, 0.012), (0.1, 1.0, 3.5)],
 )
 def test_published_u_of_one_ring(step, quantum, u_mm):
     """Published: recalibration.md, section 3: one ring of 1.6 m, r 6.5 m, without head."""
@@ -102,6 +128,13 @@ def test_published_u_of_one_ring(step, quantum, u_mm):
     design = state.design(dips)
     u = np.sqrt(np.linalg.inv(design.T @ design)[1, 1]) * quantum / np.sqrt(12)
     assert_allclose(1000 * u, u_mm, rtol=0.06)
+    stated = {
+        (0.001, 0.001): figures_of("docs/read-table.md", "| 1 mm to 1 L | () mm |"),
+        (0.01, 0.001): figures_of("docs/read-table.md", "| 1 cm to 1 L | () mm |"),
+        (0.01, 0.01): figures_of("docs/read-table.md", "| 1 cm to 10 L | () mm |"),
+        (0.1, 1.0): figures_of("docs/read-table.md", "| 1 dm to 1 m³ | () mm; in tank S-1"),
+    }
+    assert float(*stated[step, quantum]) == u_mm
 
 
 def test_undecided_head_of_a_coarse_table():
@@ -234,7 +267,13 @@ def test_many_simulated_tables(figure):
     off, w, heads = (np.array(one) for one in zip(*drawn, strict=True))
     figure("largest error of a radius, mm", off.max())
     figure("largest error of a density over its u", np.abs(w).max())
-    assert off.max() < 0.05
+    count, within_mm = figures_of(
+        "docs/read-table.md",
+        "In () simulated tables (litres, rows of 1 cm, up to three pieces of deadwood each) the "
+        "head was decided correctly, and all radii were correct within () mm",
+    )
+    assert len(drawn) in (12, int(count))
+    assert off.max() < float(within_mm)
     assert np.all(heads == "with")
     assert np.sum(np.abs(w) > 3) < 3
     assert np.sqrt(np.mean(w**2)) < 1.2
