@@ -89,3 +89,15 @@ def test_the_effect_is_told_in_each_language(roofed, language):
 def test_no_sentence_without_such_a_default():
     paper = Paper(record_of_example("strapping"), language="en")
     assert method.default_effects(paper) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dip", [0.5, 1.234, 8.4])
+def test_a_delivery_down_to_the_empty_tank_has_the_U_of_its_volume(dip):
+    """Both are one quantity, whichever method determined its U."""
+    result = tankcal.run(tankcal.load("examples/strapping"))
+    volume, delivery = result.at(dip), result.delivery(0.0, dip)
+    assert (delivery.value_m3, delivery.U_m3) == (volume.value_m3, volume.U_m3)
+    assert delivery.interval == volume.interval
+    # The law of propagation lets the error of the zero cancel, so its U would be smaller.
+    assert result.table.delivery(0.0, dip).U_m3 < 0.99 * volume.U_m3

@@ -70,20 +70,22 @@ LARGER_PART = 0.5  # share of the variance above which an input determines a dis
 
 
 def sentences(paper, mark=MARK):
-    """Return sentences on U, its propagation, and its validation by Monte Carlo (list of str).
+    """Return the sentences of the certificate on U and k (list of str).
 
-    `mark` is the mark of rows with a Monte Carlo interval.
+    `mark` is the mark of rows with a Monte Carlo interval. Details of the simulation are in the
+    working papers (`monte_carlo.sentence`).
     """
-    capacity = paper.record["capacity"]
-    low, high = (paper.number(end(capacity["k"]), decimals=2) for end in (min, max))
-    common_k = paper.word("texts.k_one", k=low)
-    k = common_k if low == high else paper.word("texts.k_range", low=low, high=high)
-    texts = [paper.word("texts.uncertainty", coverage=paper.coverage(), k=k), *k_sentences(paper)]
-    if paper.record.get("monte_carlo"):
-        texts.append(_simulated(paper, mark))
-    elif paper.record["job"]["table"].get("monte_carlo") is False:
-        texts.append(paper.word("texts.monte_carlo_off"))
-    return [*texts, *default_effects(paper)]
+    record = paper.record
+    simulated = {*flag_simulated(record["capacity"])}
+    simulated |= {row["simulated"] for row in (*stated_rows(record), *limit_rows(record))}
+    how = {(False,): "how_gum", (True,): "how_monte_carlo"}.get(tuple(simulated), "how_mixed")
+    method = paper.word(f"texts.{how}", coverage=paper.coverage(), mark=mark)
+    of_k = k_sentences(paper)
+    if how == "how_mixed":
+        of_k = [paper.word("texts.k_where", sentence=sentence) for sentence in of_k]
+    is_off = record["job"]["table"].get("monte_carlo") is False
+    off = [paper.word("texts.monte_carlo_off")] if is_off else []
+    return [method, *of_k, *off, *default_effects(paper)]
 
 
 def default_effects(paper):
@@ -93,39 +95,56 @@ def default_effects(paper):
     variance. The sentences name input, u, distribution, and the number of such results.
     """
     record = paper.record
-    capacity, budgets = record["capacity"], record.get("budgets", [])
-    defaults = [line for line in budget_lines(record) if line.get("is_default")]
-    factor, kinds = factor_of(capacity), np.array(capacity.get("input_kind") or [])
-    simulated = flag_simulated(capacity)
-    simulated_budgets = [budget for budget in budgets if budget.get("interval") == MONTE_CARLO]
     sentences = []
-    for line in defaults:
-        # Rows of the table have no lines of a budget; their shares follow from the factor.
-        columns = factor[simulated][:, kinds == line["input"]] if len(kinds) else factor[:0]
-        variance = np.sum(factor[simulated] ** 2, axis=1)
-        of_rows = (np.sum(columns**2, axis=1) / variance)[variance > 0] if len(columns) else []
-        of_budgets = [
-            part["share"] or 0.0
-            for budget in simulated_budgets
-            for part in budget["lines"]
-            if part["input"] == line["input"]
-        ]
-        counts = [int(np.sum(np.asarray(of) > LARGER_PART)) for of in (of_rows, of_budgets)]
-        if any(counts):
+    for line in budget_lines(record):
+        of_rows, of_budgets = simulated_shares(record, line["input"])
+        rows, stated = (int(np.sum(shares > LARGER_PART)) for shares in (of_rows, of_budgets))
+        if line.get("is_default") and rows + stated:
             sentences.append(
                 paper.word(
                     "texts.default_effect",
                     input=paper.input_name(line | {"is_default": False}),
                     u=_format_u(paper, line["u"], line["unit"]),
                     distribution=_distribution(paper, line),
-                    rows=counts[0],
-                    all_rows=len(simulated),
-                    stated=counts[1],
-                    all_stated=len(budgets),
+                    rows=rows,
+                    all_rows=len(record["capacity"]["volume_m3"]),
+                    stated=stated,
+                    all_stated=len(record["budgets"]),
                     share=paper.number(max(*of_rows, *of_budgets), "share", digits=2),
                 )
             )
     return sentences
+
+
+def simulated_shares(record, name):
+    """Return the shares of an input in the variances of results whose interval is by Monte Carlo.
+
+    Parameters
+    ----------
+    record : dict
+        Record with a capacity table.
+    name : str
+        Name of the input.
+
+    Returns
+    -------
+    of_rows, of_budgets : ndarray
+        Shares in rows of the table with u above 0, and in stated volumes and deliveries.
+    """
+    capacity = record["capacity"]
+    # Rows of the table have no lines of a budget; their shares follow from the factor.
+    variances = factor_of(capacity)[flag_simulated(capacity)] ** 2
+    variances = variances[variances.sum(axis=1) > 0]
+    is_input = [kind == name for kind in capacity.get("input_kind") or capacity["inputs"]]
+    of_rows = variances[:, is_input].sum(axis=1) / variances.sum(axis=1)
+    of_budgets = [
+        line["share"] or 0.0
+        for budget in record.get("budgets", [])
+        if budget.get("interval") == MONTE_CARLO
+        for line in budget["lines"]
+        if line["input"] == name
+    ]
+    return of_rows, np.array(of_budgets)
 
 
 def k_sentences(paper):
@@ -147,44 +166,6 @@ def k_sentences(paper):
 def _between(paper, ends):
     low, high = ends
     return low if low == high else paper.word("texts.between_values", low=low, high=high)
-
-
-def _simulated(paper, mark):
-    simulation = paper.record["monte_carlo"]
-    return paper.word(
-        "texts.simulated",
-        seed=str(simulation["seed"]),
-        draws=draws(paper),
-        drawn=simulation.get("drawn", len(paper.record["capacity"]["volume_m3"])),
-        others=_others(paper, simulation),
-        verdict=verdict(paper, mark),
-    )
-
-
-def _others(paper, simulation):
-    """Return a sentence on rows without draws of their own; "" if all rows were drawn."""
-    rows = len(paper.record["capacity"]["volume_m3"])
-    return paper.word("texts.others_follow") if simulation.get("drawn", rows) < rows else ""
-
-
-def draws(paper):
-    """Return the number of draws per row, or its range, in words."""
-    drawn = paper.record["monte_carlo"]["rows"]["draws"]
-    low, high = min(drawn), max(drawn)
-    if low == high:
-        return paper.number(low, decimals=0)
-    return paper.word("texts.draws", low=low, high=high)
-
-
-def verdict(paper, mark):
-    """Return a sentence on the number of rows in which the GUM interval is validated."""
-    simulated = flag_simulated(paper.record["capacity"])
-    if not any(simulated):
-        return paper.word("texts.validated_all")
-    if all(simulated):
-        return paper.word("texts.validated_none")
-    count = simulated.count(False)
-    return paper.word("texts.validated_some", count=count, all=len(simulated), mark=mark)
 
 
 def inputs(paper):

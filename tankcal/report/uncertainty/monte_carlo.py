@@ -5,7 +5,7 @@ from itertools import groupby
 from tankcal.record.columns import rows_of
 from tankcal.report import blocks
 from tankcal.report.tables import Column, Table
-from tankcal.report.uncertainty import method
+from tankcal.report.uncertainty.stated import MARK, flag_simulated
 from tankcal.text.digits import LITRE_DECIMALS
 from tankcal.text.words import name_of_input
 
@@ -27,11 +27,47 @@ def facts(paper):
         ("seed", str(simulation["seed"])),
         ("probability", paper.percent(simulation["probability"])),
         ("tolerance", paper.word("texts.tolerance", digits=simulation["digits"])),
-        ("draws", method.draws(paper)),
+        ("draws", draws(paper)),
         ("curved", _curved(paper) or paper.word("texts.none_curved")),
         ("rows_validated", validated),
         *((key, paper.number(count, decimals=0)) for key, count in counts.items()),
     ]
+
+
+def sentence(paper):
+    """Return a sentence on the draws, the model, and the rows in which both intervals agree."""
+    simulation = paper.record["monte_carlo"]
+    rows = len(paper.record["capacity"]["volume_m3"])
+    drawn = simulation.get("drawn", rows)
+    return paper.word(
+        "texts.simulated",
+        seed=str(simulation["seed"]),
+        draws=draws(paper),
+        drawn=drawn,
+        all=rows,
+        others=paper.word("texts.others_follow") if drawn < rows else "",
+        verdict=_verdict(paper),
+    )
+
+
+def draws(paper):
+    """Return the number of draws per row, or its range, in words."""
+    drawn = paper.record["monte_carlo"]["rows"]["draws"]
+    low, high = min(drawn), max(drawn)
+    if low == high:
+        return paper.number(low, decimals=0)
+    return paper.word("texts.draws", low=low, high=high)
+
+
+def _verdict(paper):
+    """Return a sentence on the number of rows in which the GUM interval is validated."""
+    simulated = flag_simulated(paper.record["capacity"])
+    if not any(simulated):
+        return paper.word("texts.agrees_all")
+    if all(simulated):
+        return paper.word("texts.agrees_none")
+    count = simulated.count(False)
+    return paper.word("texts.agrees_some", count=count, all=len(simulated), mark=MARK)
 
 
 def _curved(paper):
@@ -151,32 +187,36 @@ SIMULATED = Table(
 
 
 def range_blocks(paper):
-    """Table of the ranges of rows with equal verdict."""
+    """Sentence on the simulation, and table of the ranges of rows with equal verdict."""
     rows = ranges(paper.record)
     shown = rows[:MOST_RANGES]
-    table = paper.show(RANGES, shown)
-    if len(shown) == len(rows):
-        return [table]
-    return [table, paper.paragraph("only_first_ranges", shown=len(shown), all=len(rows))]
+    found = [blocks.paragraph(sentence(paper)), paper.show(RANGES, shown)]
+    if len(shown) < len(rows):
+        found.append(paper.paragraph("only_first_ranges", shown=len(shown), all=len(rows)))
+    every = (*rows, *DELIVERIES.rows(paper.record))
+    if not all(row["validated"] for row in every):
+        digits = paper.record["monte_carlo"]["digits"]
+        found.append(paper.paragraph("why_not_validated", digits=digits))
+    return found
 
 
 def delivery_blocks(paper):
     """Table of the simulated deliveries; [] if there are none."""
     rows = DELIVERIES.rows(paper.record)
-    return [paper.show(DELIVERIES, rows), *_why(paper, rows)] if rows else []
+    return [paper.show(DELIVERIES, rows), *_difference(paper, rows)] if rows else []
 
 
-def _why(paper, rows):
-    """Paragraph on deliveries that are not validated; [] if all are validated."""
+def _difference(paper, rows):
+    """Paragraph on the difference of deliveries that are not validated; [] if all are."""
     failed_rows = [row for row in rows if not row["validated"] and row["U_m3"]]
     if not failed_rows:
         return []
     differences = [max(row["d_low"], row["d_high"]) for row in failed_rows]
     share = max(d / row["U_m3"] for d, row in zip(differences, failed_rows, strict=True))
-    sentence = paper.word(
-        "texts.why_not_validated",
-        digits=paper.record["monte_carlo"]["digits"],
-        difference=paper.number(max(differences), "m3", digits=2),
-        share=paper.number(share, "share", digits=2),
-    )
-    return [blocks.paragraph(sentence)]
+    return [
+        paper.paragraph(
+            "difference_of_deliveries",
+            difference=paper.number(max(differences), "m3", digits=2),
+            share=paper.number(share, "share", digits=2),
+        )
+    ]
