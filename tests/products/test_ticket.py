@@ -474,7 +474,52 @@ def test_bad_rows_are_named_by_row_and_column(settings, tmp_path):
     )
     with pytest.raises(InputError) as refused:
         read_tickets(_cylinder(), settings(), rows)
-    assert str(refused.value.texts[0]).startswith("tickets.csv, row 4")
+    dip, temperature = map(str, refused.value.texts)
+    assert dip.startswith("tickets.csv, row 3, closing_dip_m: the dip is 19.0000 m")
+    assert temperature.startswith("tickets.csv, row 4, closing_temperature_c")
+
+
+def test_all_problems_are_reported_in_a_single_run(settings, tmp_path):
+    """Invalid cells, dips outside the table, and values outside the correction, a line each."""
+    rows = tmp_path / "tickets.csv"
+    rows.write_text(
+        "ticket,closing_dip_m,closing_temperature_c,density_kg_m3,closing_water_dip_m\n"
+        "A,9.0,30,842,\n"  # correct
+        "B,nine,30,842,\n"
+        "C,19.0,30,842,\n"
+        "D,9.0,155,842,\n"  # above 150 degC
+        "E,9.0,30,400,\n"  # below 610.6 kg/m3
+        "F,9.0,155,1500,\n"  # both
+        "G,9.0,30,0.842,\n"
+        "H,9.0,hot,842,9.5\n"
+        "I,9.0,30,842,9.0\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(InputError) as refused:
+        read_tickets(_cylinder(), settings(("dip_m = 2.0", "dip_m = 22.0")), rows)
+    found = [(problem.file, problem.row, problem.column) for problem in refused.value.problems]
+    assert sorted(place for place in found if place[0] == "tickets.csv") == [
+        ("tickets.csv", 3, "closing_dip_m"),
+        ("tickets.csv", 4, "closing_dip_m"),
+        ("tickets.csv", 5, "closing_temperature_c"),
+        ("tickets.csv", 6, "density_kg_m3"),
+        ("tickets.csv", 7, "closing_temperature_c"),
+        ("tickets.csv", 7, "density_kg_m3"),
+        ("tickets.csv", 8, "density_kg_m3"),
+        ("tickets.csv", 9, "closing_temperature_c"),
+        ("tickets.csv", 9, "closing_water_dip_m"),
+        ("tickets.csv", 10, "closing_water_dip_m"),
+    ]
+    assert [column for file, _, column in found if file == "ticket.toml"] == ["opening.dip_m"]
+
+
+def test_an_unknown_column_is_reported_alone(settings, tmp_path):
+    """Its values would seem to be missing in every row."""
+    rows = tmp_path / "tickets.csv"
+    rows.write_text("ticket,closing_gauge\nA,9.0\nB,8.0\n", encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        read_tickets(_cylinder(), settings(("dip_m = 9.0\n", "")), rows)
+    assert [problem.column for problem in refused.value.problems] == ["closing_gauge"]
 
 
 def test_command_prints_the_quantities(settings, example_record, tmp_path, capsys):

@@ -177,7 +177,8 @@ def test_the_empty_form_asks_for_what_is_missing(tmp_path):
     with pytest.raises(InputError) as refused:
         read_tickets(_cylinder(), path)
     assert {problem.column for problem in refused.value.problems} == {
-        "product.correction", "product.density_is"}  # fmt: skip
+        "product.correction", "product.density_is", "product.density_kg_m3",
+        "closing.dip_m"}  # fmt: skip
     text = path.read_text(encoding="utf-8")
     values = {"number": '"7"', "date": "2026-05-03", "density_kg_m3": "842.0"} | {
         key: f'"{value}"' for key, value in

@@ -1,7 +1,7 @@
 """Reading of tickets: ticket.toml for one ticket, a CSV file beside it for many."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from tankcal.job.fields import Field
 from tankcal.job.folder import read_csv
 from tankcal.job.tables import Log, read_bytes
 from tankcal.messages import message
-from tankcal.products.quantity.chain import QUANTITIES, Gauging, Product
+from tankcal.products.quantity.chain import QUANTITIES, Gauging, Product, follow_chain
 from tankcal.products.quantity.factor_table import read_factor_table
 from tankcal.products.quantity.slips import find_slips
 from tankcal.products.quantity.transfer import STATES, Transfer
@@ -121,6 +121,8 @@ _KEY_OF_COLUMN = {
     **{f"{state}_{field.name}": (state, field.name) for state in STATES for field in GAUGING},
 }
 _COLUMN_OF_KEY = {".".join(place): column for column, place in _KEY_OF_COLUMN.items()}
+
+_READINGS = [field for field in fields(Gauging) if field.name != "table_error_m3"]
 
 SETTINGS_NAME = message("ticket_settings", "settings of the ticket")  # in place of a file
 
@@ -302,14 +304,15 @@ def _read(table, settings, rows, factors):
         rows = Path(rows).absolute()
         paths.append(rows)
     columns = None if rows is None else _read_rows(rows, marks, name, log)
-    log.stop_if_problems()
+    # Without a readable file, or with an unknown key or column, values would seem to be missing.
+    if not all(_is_known(problem.column) for problem in log.problems):
+        log.stop_if_problems()
     source = _Source(name, sections, places, columns, log)
     product = sections["product"]
     if factors is None and product["correction"] == TABLE and product["factor_table"]:
         path = folder / product["factor_table"]
         paths.append(path)
         factors = read_factor_table(path, product["base"] or "20C", marks, log, name)
-        log.stop_if_problems()
     correction = _correction(source, factors)
     single = (sections["ticket"]["number"] or "1",)
     names = single if columns is None else tuple(columns.of("ticket"))
@@ -319,13 +322,13 @@ def _read(table, settings, rows, factors):
         source.tell("closing.dip_m", message("ticket_no_closing", "missing; expected the "
                     "gauging after the transfer, or of the stock"))  # fmt: skip
     compared = _compared(source)
-    log.stop_if_problems()
     gaugings, taped = {}, {}
     for state in states:
         gaugings[state], taped[state] = _gauging(source, state, table)
     product = _product(source, correction, table)
-    log.stop_if_problems()
-    _refuse_outside_correction(source, gaugings, product)
+    if correction is not None and sections["product"]["density_is"] is not None:
+        _refuse_outside_correction(source, gaugings, product)
+        _refuse_negative(source, table, gaugings, product)
     _warn_of_slips(source, gaugings, product)
     log.stop_if_problems()
     given = sections["uncertainty"]
@@ -335,8 +338,6 @@ def _read(table, settings, rows, factors):
         u["u_sw_percent"] = np.where(is_measured, u["u_sw_percent"], 0.0)
     probability = sections["ticket"]["coverage_probability"] or 0.95
     transfer = Transfer(table, gaugings, taped, product, u, probability)
-    _refuse_negative(source, transfer)
-    log.stop_if_problems()
     files = {path.name: digest_of(path) for path in paths}
     return Tickets(names, sections, transfer, compared, tuple(log.warnings), files, columns)
 
@@ -357,6 +358,13 @@ def _read_rows(path, marks, settings_file, log):
                            count=len(columns.rows), most=MOST_TICKETS)  # fmt: skip
         log.problem(path.name, expected)
     return columns
+
+
+def _is_known(column):
+    """Whether a ticket has a key or column."""
+    section, _, key = (column or "").partition(".")
+    is_key = any(key == field.name for field in SECTIONS.get(section, ()))
+    return is_key or any(column == field.name for field in ROWS)
 
 
 class _Source:
@@ -394,17 +402,45 @@ class _Source:
         if column is not None:
             cells = self.columns.numbers(column)
             values = np.where(np.isnan(cells), values, cells)
-        return values
+        # An invalid value is not replaced: the ticket would be checked with another value.
+        return np.where(self.is_faulty(key), np.nan, values)
 
-    def tell(self, key, expected, ticket=0, *, is_warning=False):
-        """Report on a key of a ticket, in the row of the file that contains it."""
-        report = self.log.warning if is_warning else self.log.problem
+    def is_faulty(self, key):
+        """Whether the value of each ticket has a problem already, shape (n,)."""
+        if not self.log.problems:
+            return np.zeros(self.count, dtype=bool)
+        if self.column(key) is None:
+            return np.full(self.count, self.log.has(*self._place(key)))
+        return np.array([self.log.has(*self._place(key, row)) for row in range(self.count)])
+
+    def is_without_problem(self):
+        """Whether each ticket has no problem so far, in its row or in the TOML file, shape (n,)."""
+        rows = {problem.row if self.columns and problem.file == self.columns.file else None
+                for problem in self.log.problems}  # fmt: skip
+        if None in rows:
+            return np.zeros(self.count, dtype=bool)
+        if self.columns is None:
+            return np.ones(self.count, dtype=bool)
+        return np.array([row not in rows for row in self.columns.rows])
+
+    def _place(self, key, ticket=0):
+        """(file, row, name) of the value of a ticket."""
         section, _, _ = key.partition(".")
         column = self.column(key)
         if column is None:
-            report(self.file, expected, self.places.get(key, self.places.get(section)), key)
-        else:
-            report(self.columns.file, expected, self.columns.rows[ticket], column)
+            return self.file, self.places.get(key, self.places.get(section)), key
+        return self.columns.file, self.columns.rows[ticket], column
+
+    def tell(self, key, expected, ticket=0, *, is_warning=False):
+        """Report on a key of a ticket, in the row of the file that contains it.
+
+        A value with a problem has no further report.
+        """
+        file, row, name = self._place(key, ticket)
+        if self.log.has(file, row, name):
+            return
+        report = self.log.warning if is_warning else self.log.problem
+        report(file, expected, row, name)
 
     def tell_each(self, key, is_wrong, expected, *, is_warning=False):
         """Report on each ticket with `is_wrong`; expected(ticket) is its message."""
@@ -470,7 +506,7 @@ def _gauging(source, state, table):
     both = np.isfinite(dip) & np.isfinite(ullage)
     text = message("ticket_dip_and_ullage", "given together with a dip; expected only one of them")
     source.tell_each(f"{state}.ullage_m", both, lambda _: text)
-    neither = np.isnan(dip) & np.isnan(ullage)
+    neither = np.isnan(dip) & np.isnan(ullage) & ~source.is_faulty(f"{state}.ullage_m")
     text = message("ticket_no_dip", "missing; expected the dip, or the ullage")
     source.tell_each(f"{state}.dip_m", neither, lambda _: text)
     by_ullage = np.isfinite(ullage)
@@ -486,7 +522,7 @@ def _gauging(source, state, table):
     text = message("ticket_no_temperature", "missing; expected the temperature of the liquid")
     source.tell_each(f"{state}.temperature_c", np.isnan(temperature), lambda _: text)
     ambient = source.numbers(f"{state}.ambient_c")
-    if not source.sections["shell"]["insulated"]:
+    if not source.sections["shell"]["insulated"] and not source.is_faulty("shell.insulated").any():
         text = message("ticket_no_ambient", "missing; expected the temperature of the air, because "
                        "the shell is not insulated")  # fmt: skip
         source.tell_each(f"{state}.ambient_c", np.isnan(ambient), lambda _: text)
@@ -601,6 +637,8 @@ def _product(source, correction, table):
         contained = getattr(correction, "glass_scale", None)
         if contained is not None:  # the correction expects a reading of a glass hydrometer
             glass = glass / glass_correction(sample, contained)
+    elif source.is_faulty("product.density_is").any():
+        pass  # the kind of density is not known
     elif given["hydrometer"] is not None or source.has("product.density_temperature_c"):
         text = message("ticket_density_at_base", "given with a density at the base; expected "
                        "density_is = observed, or no temperature of a sample and no hydrometer"
@@ -657,24 +695,71 @@ def _warn_of_slips(source, gaugings, product):
 
 def _refuse_outside_correction(source, gaugings, product):
     """Report tickets outside the range of the volume correction."""
-    try:
-        base = product.base_density()
-    except OutsideRangeError as error:
-        key = "density_temperature_c" if error.quantity == "temperature_c" else error.quantity
-        _tell_outside(source, f"product.{key}", error, product)
+    is_complete = np.isfinite(product.density)
+    if product.sample_c is not None:
+        is_complete &= np.isfinite(product.sample_c)
+    rows = np.flatnonzero(is_complete)
+
+    def density_at_base(rows):
+        return _product_of(product, rows).base_density()
+
+    def name_of(error):
+        is_sample = error.quantity == "temperature_c"
+        return f"product.{'density_temperature_c' if is_sample else error.quantity}"
+
+    rows = _rows_inside(source, product, rows, density_at_base, name_of)
+    if not rows.size:
         return
+    base = np.full(source.count, np.nan)
+    base[rows] = density_at_base(rows)
     for state, gauging in gaugings.items():
-        try:
-            product.correction.factor(base, gauging.temperature_c, gauging.pressure_kpa)
-        except OutsideRangeError as error:
+        is_complete = np.isfinite(gauging.temperature_c) & np.isfinite(gauging.pressure_kpa)
+
+        def factor(rows, gauging=gauging):
+            readings = base[rows], gauging.temperature_c[rows], gauging.pressure_kpa[rows]
+            return product.correction.factor(*readings)
+
+        def name_of(error, state=state):
             owner = "product" if error.quantity in _PRODUCT_KEYS else state
-            _tell_outside(source, f"{owner}.{error.quantity}", error, product)
-            if owner == "product":  # common to both states
-                return
+            return f"{owner}.{error.quantity}"
+
+        _rows_inside(source, product, rows[is_complete[rows]], factor, name_of)
 
 
-def _tell_outside(source, key, error, product):
-    """Report each ticket with a value outside the range of the volume correction."""
+def _rows_inside(source, product, rows, evaluate, name_of):
+    """Tickets, by their indices, that a volume correction accepts; the others are reported.
+
+    Parameters
+    ----------
+    rows : ndarray of int
+        Tickets with complete values.
+    evaluate : callable
+        evaluate(rows) raises OutsideRangeError for values outside the range.
+    name_of : callable
+        name_of(error) returns the key of the value.
+    """
+    while rows.size:
+        try:
+            evaluate(rows)
+        except OutsideRangeError as error:
+            _tell_outside(source, name_of(error), error, product, rows)
+            # A correction reports a single quantity: other tickets are tried again without these.
+            rows = rows[~np.broadcast_to(error.is_outside, rows.shape)]
+        else:
+            break
+    return rows
+
+
+def _product_of(product, rows):
+    """`Product` of some tickets, by their indices."""
+    arrays = {name: getattr(product, name)[rows]
+              for name in ("density", "glass", "water_share", "expansion_per_k")}  # fmt: skip
+    sample = None if product.sample_c is None else product.sample_c[rows]
+    return replace(product, sample_c=sample, **arrays)
+
+
+def _tell_outside(source, key, error, product, rows):
+    """Report each of the tickets `rows` with a value outside the range of the correction."""
     # The range of ethanol is checked at the temperature of the sample, others at the base.
     is_derived = (
         error.quantity == "density_kg_m3"
@@ -682,21 +767,32 @@ def _tell_outside(source, key, error, product):
         and not isinstance(product.correction, Ethanol)
     )
 
+    is_outside = np.zeros(source.count, dtype=bool)
+    is_outside[rows] = error.is_outside
+
     def expected(ticket):
-        text = error.expected_at(() if np.ndim(error.is_outside) == 0 else (ticket,))
+        place = () if np.ndim(error.is_outside) == 0 else (np.searchsorted(rows, ticket),)
+        text = error.expected_at(place)
         if is_derived and text.code != "no_density_at_base":  # the user wrote another density
             text = message("ticket_at_base", "at the base temperature: {text}", text=text)
         return text
 
-    source.tell_each(key, error.is_outside, expected)
+    source.tell_each(key, is_outside, expected)
 
 
-def _refuse_negative(source, transfer):
+def _refuse_negative(source, table, gaugings, product):
     """Refuse dips at which water and roof leave no volume of the product."""
+    rows = np.flatnonzero(source.is_without_problem())
+    if not rows.size:
+        return
     text = message("ticket_negative", "the volume without water is not above 0; expected a dip "
                    "further above the water and the roof")  # fmt: skip
-    for state, steps in transfer.steps.items():
-        source.tell_each(f"{state}.dip_m", ~(steps.gov_m3 > 0), lambda _: text)
+    for state, gauging in gaugings.items():
+        some = {field.name: getattr(gauging, field.name)[rows] for field in _READINGS}
+        gov = follow_chain(table, replace(gauging, **some), _product_of(product, rows)).gov_m3
+        is_negative = np.zeros(source.count, dtype=bool)
+        is_negative[rows] = ~(gov > 0)
+        source.tell_each(f"{state}.dip_m", is_negative, lambda _: text)
 
 
 def _compared(source):
