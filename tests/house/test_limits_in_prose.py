@@ -3,25 +3,40 @@
 import math
 import re
 import tomllib
+from statistics import NormalDist
 
 import pytest
 from page_figures import agree, figures_of
 from page_sessions import ROOT
 
-from tankcal import units
+from tankcal import adjust, units
+from tankcal.clouds import reading as cloud_reading
+from tankcal.clouds.formats import counted_text, decoding, e57, lines
+from tankcal.clouds.inside import bottom as cloud_bottom
+from tankcal.clouds.inside import floor_cells
+from tankcal.clouds.wall import deciding, features, growing, screens, start
 from tankcal.geometry.field.components import COMPONENTS
 from tankcal.geometry.field.places import OF_GREAT_CIRCLES, OF_SPHERES
 from tankcal.job import plausibility
 from tankcal.job.checks import obstructions, tiny_sds
 from tankcal.job.checks.settings import MAX_TABLE_ROWS
 from tankcal.job.checks.survey import instruments
+from tankcal.job.contract import ranging
+from tankcal.methods.clouds import bottom as clouds_bottom
+from tankcal.methods.clouds import overlaps
+from tankcal.methods.clouds import warnings as clouds_warnings
+from tankcal.methods.clouds.columns import ASSUMED
 from tankcal.methods.great_circles import sphere as circles
 from tankcal.methods.hits import wall as hits_wall
 from tankcal.methods.hits import warnings as hits_warnings
 from tankcal.methods.inside_hits import solid as inside_solid
 from tankcal.methods.lines import departures
 from tankcal.methods.lines import warnings as lines_warnings
+from tankcal.methods.liquid import columns as liquid_columns
+from tankcal.methods.liquid import facts as liquid_facts
 from tankcal.methods.strapping import tape_warnings
+from tankcal.pipeline import cluster
+from tankcal.pipeline.liquid import adjustment as liquid_steps
 from tankcal.pipeline.solids import scan
 from tankcal.pipeline.wall_straps import typical_shape_m
 from tankcal.products.gauge import deviation
@@ -43,6 +58,7 @@ from tankcal.report.survey import quality
 from tankcal.report.web import calculator_data
 from tankcal.survey import strapping, untied
 from tankcal.tank import gauging
+from tankcal.tank.liquid import adjustment as liquid_adjustment
 from tankcal.tank.volume_correction.brazil import Brazil
 from tankcal.tank.volume_correction.petroleum import Petroleum
 
@@ -65,6 +81,8 @@ COMPONENT = {component.name: component for component in COMPONENTS}
 NOMINAL = read_limits("nominal_size")
 STRAPS, LINES = read_limits("strapping"), read_limits("reference_line")
 HITS, TANGENTS = read_limits("wall_hits"), read_limits("tangents")
+LIQUID = tomllib.loads((ROOT / "tankcal/pipeline/liquid/limits.toml").read_text("utf-8"))["wide"]
+normal = NormalDist()
 LYING = tomllib.loads((ROOT / "tankcal/methods/inside_hits/limits.toml").read_text("utf-8"))
 ONE_IN_500 = (1, 1 / NOMINAL["share"])
 
@@ -482,6 +500,226 @@ LIMITS += [
         "For example, 0.70, 0.46 and 0.60 m³ give () with c = 0 and () with 0.5",
         [0.70 / math.sqrt(0.46**2 + 0.60**2 - 2 * c * 0.46 * 0.60) for c in (0.0, 0.5)],
     ),
+    (
+        "docs/liquid.md",
+        "until no dip moves by more than () of its standard deviation",
+        [liquid_steps.DIPS_SETTLED],
+    ),
+    (
+        "docs/liquid.md",
+        "This is () u for () steps and u = () %, () u for () steps and u = () %",
+        [100 * 0.03e-2, 100, 0.03, 300 * 0.5e-2, 300, 0.5],
+    ),
+    (
+        "docs/liquid.md",
+        "A horizontal tank has () % of diameter and length, () mm/m and () mm of zero; a sphere "
+        "() %, a mesh () %",
+        [
+            PERCENT * LIQUID["size"],
+            LIQUID["tilt_mm_per_m"],
+            LIQUID["zero_mm"],
+            PERCENT * LIQUID["size"],
+            PERCENT * LIQUID["scale"],
+        ],
+    ),
+    (
+        "docs/liquid.md",
+        "The smallest detectable size (power () at () %) is () sd",
+        [
+            adjust.POWER,
+            PERCENT * adjust.ALPHA,
+            normal.inv_cdf(1 - adjust.ALPHA / 2) + normal.inv_cdf(adjust.POWER),
+        ],
+    ),
+    (
+        "docs/liquid.md",
+        "has |w| over (), the likeliest cause is named, with all causes that chi-square does not "
+        "distinguish from it (())",
+        [liquid_adjustment.LEAST, liquid_adjustment.ALIKE],
+    ),
+    ("docs/liquid.md", "Above () U the certificate states", [liquid_facts.HIDDEN_U]),
+    (
+        "docs/liquid.md",
+        "() mm in () m changes the head by () % of its value",
+        [1, 6.5, PERCENT * (1 / 6500) * 3],
+    ),
+    (
+        "docs/liquid.md",
+        "() K is () ppm of a vertical tank",
+        [1, 2 * PPM * 1.1e-5],
+    ),
+    (
+        "docs/clouds.md",
+        "XML above () MB, of more than () elements, nested more than () deep",
+        [e57.LONGEST_XML >> 20, e57.MOST_ELEMENTS, e57.DEEPEST],
+    ),
+    ("docs/clouds.md", "numbers that do not resolve () mm", [MM * cloud_reading.COARSEST_M]),
+    (
+        "docs/clouds.md",
+        "in a child process with () GB of memory",
+        [decoding.MEMORY_LIMIT >> 30],
+    ),
+    (
+        "docs/clouds.md",
+        "may have at most () scans and lines of () MB",
+        [counted_text.MOST_SCANS, lines.LONGEST_LINE >> 20],
+    ),
+    (
+        "docs/clouds.md",
+        "a LAS scale of () rounds to () mm, a standard deviation of () mm",
+        [0.001, 1, 1 / math.sqrt(12)],
+    ),
+    (
+        "docs/clouds.md",
+        "processes of this machine with at most () GB of memory each",
+        [cluster.WORKER_BYTES >> 30],
+    ),
+    (
+        "docs/clouds.md",
+        "Allow () GB of memory for each worker",
+        [cluster.WORKER_BYTES >> 30],
+    ),
+    (
+        "docs/clouds-job.md",
+        '(()" are () mm at () m of height)',
+        [10, MM * 10 * units.ARCSEC * 10, 10],
+    ),
+    ("docs/clouds-job.md", "| `u_offset_mm` | () mm |", [ASSUMED["u_offset_mm"]]),
+    ("docs/clouds-job.md", "| `u_scale_ppm` | () ppm |", [ASSUMED["u_scale_ppm"]]),
+    (
+        "docs/clouds-job.md",
+        "| `s_translation_mm` | () mm along each axis |",
+        [ASSUMED["s_translation_mm"]],
+    ),
+    (
+        "docs/clouds-job.md",
+        '| `s_rotation_arcsec` | ()" about each axis |',
+        [ASSUMED["s_rotation_arcsec"]],
+    ),
+    (
+        "docs/clouds-job.md",
+        "w = 180°/n. It is (), (), (), () σ for 3, 4, 6, 8 scans",
+        [math.sin(math.pi / n) / (math.pi / n * math.sqrt(n)) for n in (3, 4, 6, 8)],
+    ),
+    (
+        "docs/clouds-job.md",
+        "a scan with less than () % of its points on the wall",
+        [PERCENT * clouds_warnings.LEAST_OF_WALL],
+    ),
+    (
+        "docs/clouds-job.md",
+        "incidences up to ()° and has a level of () %",
+        [overlaps.STEEPEST_DEG, PERCENT * overlaps.LEVEL],
+    ),
+    (
+        "docs/clouds-job.md",
+        "if less than () % of the plan is seen",
+        [PERCENT * (1 - clouds_bottom.UNSEEN)],
+    ),
+    (
+        "docs/clouds-wall.md",
+        "occupied if it holds () % of the fullest class",
+        [PERCENT * growing.OCCUPIED],
+    ),
+    (
+        "docs/clouds-wall.md",
+        "belong to the wall if they lie within () mm of it (() mm more for each metre",
+        [MM * growing.PATCH_STEP_M, MM * growing.PATCH_SLOPE],
+    ),
+    (
+        "docs/clouds-wall.md",
+        "deviates by three standard deviations and () mm",
+        [MM * growing.LEAST_TREND_M],
+    ),
+    (
+        "docs/clouds-wall.md",
+        "Two surfaces are refused where () % of the cells of most sectors show both, or where "
+        "another connected surface has () % of the cells",
+        [PERCENT * deciding.TWO_SURFACES, PERCENT * deciding.RIVAL],
+    ),
+    (
+        "docs/clouds-wall.md",
+        "(inwards for scans from outside) in () % of its coarse cells",
+        [PERCENT * screens.REAR_SHARE],
+    ),
+    (
+        "docs/clouds-wall.md",
+        "without a step in () % of the rows",
+        [PERCENT * screens.LEAVING_SHARE],
+    ),
+    (
+        "docs/clouds-wall.md",
+        "accepted with a radius within () % of the nominal radius",
+        [PERCENT * start.WIDE],
+    ),
+    (
+        "docs/clouds-wall.md",
+        "any surface whose radius differs by more than () %",
+        [PERCENT * start.WIDE],
+    ),
+    ("docs/clouds-wall.md", "A radius that differs by more than () % is", [PERCENT * start.WIDE]),
+    (
+        "docs/clouds-wall.md",
+        "thinner than () mm counts as wall",
+        [MM * growing.PATCH_STEP_M],
+    ),
+    (
+        "docs/clouds-wall.md",
+        "nor is a weld under () mm",
+        [MM * features.LEAST_WELD_M],
+    ),
+    (
+        "docs/clouds-wall.md",
+        "A second surface over less than () % of the cells",
+        [PERCENT * deciding.RIVAL],
+    ),
+    (
+        "docs/clouds-wall.md",
+        "A layer of () mm over the plan of a tank of () m is () % of its volume",
+        [1, 8, PERCENT * 1e-3 / 8],
+    ),
+    (
+        "docs/liquid-job.md",
+        "| `u_expansion_per_k` | () % of the expansion |",
+        [PERCENT * liquid_columns.EXPANSION_SHARE],
+    ),
+    (
+        "docs/liquid-job.md",
+        "| `u_radius_mm` | () % of the radius of the drawing",
+        [PERCENT * liquid_columns.RADIUS_SHARE],
+    ),
+    (
+        "docs/liquid-job.md",
+        "a meter that drifted by more than () %",
+        [PERCENT * plausibility.METER_DRIFT],
+    ),
+    ("docs/clouds-job.md", "| `u_incidence_mm` | () mm at 60°", [ranging.USUAL_INCIDENCE_MM]),
+    (
+        "docs/clouds-wall.md",
+        "are counted in classes of () mm. The range is () m, or () of the radius",
+        [MM * floor_cells.BIN_M, floor_cells.LEAST_REACH_M, floor_cells.REACH],
+    ),
+    (
+        "docs/clouds-wall.md",
+        "meet the foot of the shell within () m (or () % of the radius) and appear in () % of the",
+        [
+            cloud_bottom.FOOT_M,
+            PERCENT * cloud_bottom.FOOT_SHARE,
+            PERCENT * cloud_bottom.LEAST_SHARE,
+        ],
+    ),
+    (
+        "docs/clouds-wall.md",
+        "connected cells () mm or more below the",
+        [MM * cloud_bottom.LEAST_PIT_M],
+    ),
+    ("docs/clouds-wall.md", "and not steeper than ().", [growing.STEEPEST]),
+    (
+        "docs/clouds-wall.md",
+        "a roof over () % of the plan or more",
+        [PERCENT * cloud_bottom.ROOF_SHARE],
+    ),
+    ("docs/liquid-papers.md", "changes a volume by more than () U", [liquid_facts.HIDDEN_U]),
     (
         "docs/inspection.md",
         "gap under a board of () mm centred on a vertical or a horizontal weld: the largest gap "

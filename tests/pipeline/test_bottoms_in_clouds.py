@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from generated_clouds import FULL_TURN, Scene
 from job_builder import write_folder
+from page_figures import figures_of
 from scipy.spatial.transform import Rotation
 from test_walls_in_clouds import scene_parts
 
@@ -181,4 +182,8 @@ def test_volumes_scatter_as_their_shared_columns_say(figure):
 
     drawn = [volume([moved() for _ in range(3)])[0] for _ in range(200)]
     figure("u of a bottom by three moved scans, said / scatter", f"{predicted / np.std(drawn):.3f}")
-    assert predicted == pytest.approx(np.std(drawn), rel=0.15)
+    count, percent = figures_of(
+        "docs/clouds-job.md", "u agrees with the scatter of () draws within () %"
+    )
+    assert len(drawn) == int(count)
+    assert predicted == pytest.approx(np.std(drawn), rel=float(percent) / 100)

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from metered_runs import Fault, fill, metered_job
+from page_figures import figures_of, shares_agree, value_of
 
 from tankcal.job.model import DeclaredInput
 from tankcal.pipeline.liquid.adjustment import adjust_liquid
@@ -39,6 +40,27 @@ FAULTS = {
     "leak": (Fault("leak", 0.1), 2.1e-4),
     "fahrenheit": (Fault("fahrenheit"), 8e-4),  # oil: of water they hardly matter
     "swapped": (Fault("swapped"), 8e-4),
+}
+
+
+ROWS = {  # of upright tanks, then of lying tanks: named, right, number of kinds
+    "meter": ("docs/liquid.md", "| meter 0.1 % | (), right () (()) | (), right () (()) |"),
+    "radii": ("docs/liquid.md", "| radii 2 mm | (), right () (()) | (), right () (()) |"),
+    "dip": ("docs/liquid.md", "| one dip 10 mm | (), right () (()) | (), right () (()) |"),
+    "dip_zero": ("docs/liquid.md", "| zero of all dips 2 mm | () | (), right () (()) |"),
+    "batch": ("docs/liquid.md", "| a batch missing | (), right () (()) | (), right () (()) |"),
+    "leak": (
+        "docs/liquid.md",
+        "| a valve that passes, 0.1 m³/h | (), right () (()) | (), right () (()) |",
+    ),
+    "fahrenheit": (
+        "docs/liquid.md",
+        "| temperatures in Fahrenheit | (), right () (()) | (), right () (()) |",
+    ),
+    "swapped": (
+        "docs/liquid.md",
+        "| temperatures of meter and tank exchanged | (), right () (()) | (), right () (()) |",
+    ),
 }
 
 
@@ -163,6 +185,13 @@ def test_planted_faults_are_named(tmp_path, kind, fault):
     shown = [right for kinds, right in outcomes if kinds]
     kinds = np.mean([kinds for kinds, _ in outcomes if kinds] or [0.0])
     print(f"{kind} {fault}: shows in {len(shown)} of 50, right in {sum(shown)}, {kinds:.1f} kinds")
+    stated = figures_of(*ROWS[fault])
+    upright, lying = stated[:-3], stated[-3:]
+    mine = upright if kind == "upright" else lying
+    assert shares_agree([len(shown) / 50], [f"{value_of(mine[0]) / 50}"], 50, 50)
+    if len(mine) > 1 and shown:
+        assert shares_agree([sum(shown) / 50], [f"{value_of(mine[1]) / 50}"], 50, 50)
+        assert kinds == pytest.approx(value_of(mine[2]), abs=0.5)
     if len(shown) >= 10:
         assert np.mean(shown) >= 0.8
 
@@ -173,4 +202,8 @@ def test_sound_jobs_are_hardly_accused(tmp_path, kind):
     make, truth = KINDS[kind]
     job, rng = make(tmp_path / "job", 2.1e-4), np.random.default_rng(12)
     accused = sum(told(job, truth, Fault(), rng)[0] > 0 for _ in range(50))
-    assert accused <= 3
+    jobs, most = figures_of(
+        "docs/liquid.md", "Of () fault-free jobs of each kind, a cause is named in at most ()"
+    )
+    assert jobs == "50"
+    assert accused <= int(most)
