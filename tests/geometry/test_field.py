@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from generated_walls import job_of, make_wall, survey
 from jacobians import assert_derivative
+from page_figures import figures_of
 
 import tankcal.pipeline.wall.finding as pipeline_wall
 from tankcal.geometry.field.amplitudes import (
@@ -598,3 +599,11 @@ def test_known_welds_tell_peaks_from_the_wall_between(figure):
         off.append(1e6 * (volume(field) / truth - 1))
     figure("welds under every third line, volume off without and with them, ppm", np.round(off, 1))
     assert abs(off[1]) < 0.4 * abs(off[0])
+    peak_mm, over_m, least, most = figures_of(
+        "docs/uncertainty.md",
+        "every third line is on a weld that peaks by () mm over () m. The volume is off by more "
+        "than () ppm without the welds and by less than () ppm with them",
+    )
+    assert (peak_mm, over_m) == ("10", "0.4")
+    assert abs(off[0]) > int(least)
+    assert abs(off[1]) < int(most)

@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from page_figures import figures_of
 from scipy import stats
 from scipy.integrate import quad
 
@@ -197,6 +198,12 @@ def test_thermal_expansion_of_nist():
         return (l1 - l0) / (l0 * (t1 - t0))
 
     by_gum = propagate(alpha, Inputs([Input(n, t) for n, t in zip(declared, ts, strict=True)]))
+    printed = figures_of(
+        "docs/uncertainty.md",
+        "example E13 of NIST TN 1900: u = ()·10⁻⁶ 1/K by the law of propagation and ()·10⁻⁶ 1/K by "
+        "Monte Carlo",
+    )
+    assert printed == ("1.76", "1.74")
     assert by_gum.values[0] == pytest.approx(1.7266e-5, abs=0.5e-9)
     assert by_gum.u[0] == pytest.approx(1.76e-6, abs=0.005e-6)
     drawn = simulate(lambda x: alpha(x.T)[:, None], ts, goal=Goal(plain_draws=200_000))

@@ -38,7 +38,6 @@ LEFT = {
     "docs/ships.md": 5,
     "docs/tutorial-es.md": 10,
     "docs/tutorial-pt-BR.md": 10,
-    "docs/uncertainty.md": 982,
     "docs/where.md": 1,
     "docs/workbook.md": 8,
 }

@@ -15,8 +15,10 @@ from tankcal.clouds.formats import counted_text, decoding, e57, lines
 from tankcal.clouds.inside import bottom as cloud_bottom
 from tankcal.clouds.inside import floor_cells
 from tankcal.clouds.wall import deciding, features, growing, screens, start
+from tankcal.geometry import patches, shell
+from tankcal.geometry.field import blunders, components, estimate, sites
 from tankcal.geometry.field.components import COMPONENTS
-from tankcal.geometry.field.places import OF_GREAT_CIRCLES, OF_SPHERES
+from tankcal.geometry.field.places import OF_CYLINDERS, OF_GREAT_CIRCLES, OF_SPHERES
 from tankcal.job import plausibility
 from tankcal.job.checks import obstructions, tiny_sds
 from tankcal.job.checks.settings import MAX_TABLE_ROWS
@@ -36,8 +38,11 @@ from tankcal.methods.liquid import columns as liquid_columns
 from tankcal.methods.liquid import facts as liquid_facts
 from tankcal.methods.strapping import tape_warnings
 from tankcal.pipeline import cluster
+from tankcal.pipeline.checks import homogeneity
+from tankcal.pipeline.checks import wall as wall_checks
 from tankcal.pipeline.liquid import adjustment as liquid_steps
-from tankcal.pipeline.solids import scan
+from tankcal.pipeline.simulation import model as simulation_model
+from tankcal.pipeline.solids import scan, scanned_wall
 from tankcal.pipeline.wall_straps import typical_shape_m
 from tankcal.products.gauge import deviation
 from tankcal.products.gauge import reading as gauge
@@ -80,6 +85,10 @@ def read_limits(survey):
 COMPONENT = {component.name: component for component in COMPONENTS}
 NOMINAL = read_limits("nominal_size")
 STRAPS, LINES = read_limits("strapping"), read_limits("reference_line")
+BARREL_M = COMPONENT["common bulge"].median_m / math.sqrt((16 / 21) ** 2 / 5 + (8 / 35) ** 2 / 9)
+RECALIBRATION = tomllib.loads(
+    (ROOT / "tankcal/job/rule_tables/france_2020_recalibration.toml").read_text("utf-8")
+)
 HITS, TANGENTS = read_limits("wall_hits"), read_limits("tangents")
 LIQUID = tomllib.loads((ROOT / "tankcal/pipeline/liquid/limits.toml").read_text("utf-8"))["wide"]
 normal = NormalDist()
@@ -719,6 +728,98 @@ LIMITS += [
         "a roof over () % of the plan or more",
         [PERCENT * cloud_bottom.ROOF_SHARE],
     ),
+    (
+        "docs/uncertainty.md",
+        "is a bulge of () b rms, or of () b if it is a parabola",
+        [math.sqrt((16 / 21) ** 2 / 5 + (8 / 35) ** 2 / 9), math.sqrt((2 / 3) ** 2 / 5)],
+    ),
+    (
+        "docs/uncertainty.md",
+        "corresponds to a barrel of () mm, and the mean of its variance to () mm",
+        [MM * BARREL_M, MM * BARREL_M * math.exp(COMPONENT["common bulge"].log_sd ** 2 / 4)],
+    ),
+    (
+        "docs/uncertainty.md",
+        "have a prior correlation of (). The correlation is () for joints and seams",
+        [components.WORKMANSHIP, components.WORKMANSHIP + components.SHRINKAGE],
+    ),
+    (
+        "docs/uncertainty.md",
+        "corresponds to two seams of () mm, () m wide",
+        [MM * estimate.DEPTH_M, estimate.WIDTH_M],
+    ),
+    ("docs/uncertainty.md", "(1 - (w/s)²), w = () m", [estimate.WIDTH_M]),
+    (
+        "docs/uncertainty.md",
+        "are sought within () mm of it, or within () % of the radius if that is more. A buckle or "
+        "a settled shell of a small tank departs from the cylinder by more than () %",
+        [MM * shell.LEAST_BAND_M, PERCENT * shell.WALL_BAND, PERCENT * shell.WALL_BAND],
+    ),
+    (
+        "docs/uncertainty.md",
+        "pipes that stand off by less than () mm. It also applies to pipes among more than () "
+        "points near the wall or fewer than () columns",
+        [MM * blunders.LEAST_M, sites.MOST_SITES, blunders.FEWEST],
+    ),
+    (
+        "docs/uncertainty.md",
+        "exceed its prior median of () mm rms",
+        [MM * COMPONENT["common taper"].median_m],
+    ),
+    (
+        "docs/uncertainty.md",
+        "measured at one height, () % of the course or more off its middle",
+        [PERCENT * wall_checks.OFF_MIDDLE],
+    ),
+    ("docs/uncertainty.md", "if one of them fails at () %", [PERCENT * homogeneity.LEVEL]),
+    ("docs/uncertainty.md", "all sections together at () %", [PERCENT * homogeneity.LEVEL]),
+    (
+        "docs/uncertainty.md",
+        "with a median of () mm off the wall at most",
+        [MM * patches.FARTHEST_M],
+    ),
+    (
+        "docs/uncertainty.md",
+        "is rejected if the jump is () mm, 5 times the scatter about the smooth form, and () "
+        "standard deviations",
+        [MM * blunders.LEAST_M, blunders.LEAST_W],
+    ),
+    (
+        "docs/uncertainty.md",
+        "A point is rejected if it is () mm and () standard deviations off the wall shown by the "
+        "other points (with more than 600 points, off the median of () neighbours). It is also "
+        "rejected if it is farther than () % of the radius and () mm",
+        [
+            MM * scanned_wall.DENT_M,
+            scan.FAR,
+            scanned_wall.NEIGHBOURS,
+            PERCENT * scan.NEVER_PART,
+            MM * scan.NEVER_M,
+        ],
+    ),
+    (
+        "docs/uncertainty.md",
+        "reference height () mm; at most () years",
+        [
+            RECALIBRATION["reference_height"]["total"]["limit_mm"],
+            RECALIBRATION["period"]["all"]["years"],
+        ],
+    ),
+    (
+        "docs/uncertainty.md",
+        "In tables of more than () rows",
+        [simulation_model.MOST_ROWS],
+    ),
+    (
+        "docs/uncertainty.md",
+        "conforms with a probability of () % (k = ()",
+        [PERCENT * normal.cdf(1.959964), 1.959964],
+    ),
+    (
+        "docs/uncertainty.md",
+        "too large by () π s² (() even points)",
+        [(24 - 3) / 24, 24],
+    ),
     ("docs/liquid-papers.md", "changes a volume by more than () U", [liquid_facts.HIDDEN_U]),
     (
         "docs/inspection.md",
@@ -740,3 +841,108 @@ LIMITS += [
 def test_a_limit_in_the_text_is_that_of_the_code(page, sentence, values):
     printed = figures_of(page, sentence)
     assert agree(values, printed), (printed, values)
+
+
+PRIORS = [
+    ("docs/uncertainty.md", "equal in all courses | () mm, () | | drawn-in", ["common bulge"]),
+    ("docs/uncertainty.md", "equal in all courses | () mm, () | | own bulge", ["drawn-in joints"]),
+    (
+        "docs/uncertainty.md",
+        "of each course independently | () mm, (); () mm, () |",
+        ["own bulge", "own taper"],
+    ),
+    ("docs/uncertainty.md", "lapped and telescopic shells do | () mm, () |", ["common taper"]),
+    (
+        "docs/uncertainty.md",
+        "variance k^-3; over the whole shell, and of each course | () mm, (); () mm, () |",
+        ["common ovality", "own ovality"],
+    ),
+    ("docs/uncertainty.md", "to its ends with either sign | () mm, () |", ["turning ovality"]),
+    ("docs/uncertainty.md", "(mean square over the shell) | () mm, () |", ["settlement"]),
+    (
+        "docs/uncertainty.md",
+        "^2)^-2; over the whole shell, and of each course | () mm, (); () mm, () |",
+        ["common seams", "own seams"],
+    ),
+    ("docs/uncertainty.md", "over half a course in height | () mm, () |", ["dents"]),
+    (
+        "docs/uncertainty.md",
+        "of all welds together, and of each | peak of () mm, (); () mm, () |",
+        ["peaking", "own peaks"],
+    ),
+]
+
+
+@pytest.mark.parametrize(("page", "sentence", "names"), PRIORS, ids=lambda item: "")
+def test_priors_of_the_wall_in_the_text(page, sentence, names):
+    values = [
+        value
+        for name in names
+        for value in (MM * COMPONENT[name].median_m, math.exp(COMPONENT[name].log_sd / 2))
+    ]
+    assert agree(values, figures_of(page, sentence))
+
+
+SOLIDS = [
+    (
+        "docs/uncertainty.md",
+        "(rings of plate, girth welds) | bulge | () mm, () each",
+        OF_CYLINDERS[0],
+    ),
+    ("docs/uncertainty.md", "(a sag) | bulge | () mm, () |", OF_CYLINDERS[2]),
+    ("docs/uncertainty.md", "and over 2 m | ovality | () mm, ();", OF_CYLINDERS[3]),
+    ("docs/uncertainty.md", "ovality | 3 mm, 2.7; () mm, () | | |", OF_CYLINDERS[4]),
+    ("docs/uncertainty.md", "and over 1.5 m | seams | () mm, () each", OF_CYLINDERS[5]),
+    ("docs/uncertainty.md", "dents of 0.3 m | seams | () mm, () |", OF_CYLINDERS[7]),
+    ("docs/uncertainty.md", "along the bottom, over 3 m | seams | () mm, () |", OF_CYLINDERS[8]),
+    ("docs/uncertainty.md", "of the great-circle angle | ovality | () mm, () |", OF_SPHERES[0]),
+    ("docs/uncertainty.md", "dents of 1.2 m | seams | () mm, ();", OF_SPHERES[1]),
+    ("docs/uncertainty.md", "| seams | 4 mm, 2.1; () mm, () | | |", OF_SPHERES[2]),
+    ("docs/uncertainty.md", "by its own weight | oblateness | () mm, () |", OF_SPHERES[3]),
+]
+
+
+@pytest.mark.parametrize(("page", "sentence", "departure"), SOLIDS, ids=lambda item: "")
+def test_priors_of_horizontal_tanks_and_spheres_in_the_text(page, sentence, departure):
+    values = [MM * departure.median_m, math.exp(departure.log_sd / 2)]
+    assert agree(values, figures_of(page, sentence))
+
+
+RULES = [
+    (
+        "docs/uncertainty.md",
+        "| `oiml_r71` | U of the volumes: () % vertical, () % horizontal and inclined, () % others",
+        "oiml_r71",
+    ),
+    (
+        "docs/uncertainty.md",
+        "| `inmetro_103_2022` | U of the volumes: () % vertical |",
+        "inmetro_103_2022",
+    ),
+    (
+        "docs/uncertainty.md",
+        "| `france_2003` | relative U of the volumes: () % vertical, () % others",
+        "france_2003",
+    ),
+    ("docs/uncertainty.md", "level marks outside: () %;", "france_2003_outside"),
+    ("docs/uncertainty.md", "; alcohol () % |", "france_2003_alcohol"),
+    (
+        "docs/uncertainty.md",
+        "from the former one: () % at the top and of the whole range",
+        "france_2020_recalibration",
+    ),
+    ("docs/uncertainty.md", "of at least 500 mm: () % of the capacity", "norway_2007"),
+]
+
+
+@pytest.mark.parametrize(("page", "sentence", "name"), RULES, ids=lambda item: "")
+def test_limits_of_rules_in_the_text(page, sentence, name):
+    rule = tomllib.loads((ROOT / f"tankcal/job/rule_tables/{name}.toml").read_text("utf-8"))
+    limits = [
+        entry["limit_percent"]
+        for kind in ("uncertainty", "deviation")
+        for entry in rule.get(kind, {}).values()
+        if "limit_percent" in entry
+    ]
+    printed = [float(text) for text in figures_of(page, sentence)]
+    assert printed == list(dict.fromkeys(limits))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from draws import draws
 from numpy.polynomial.legendre import legvander
+from page_figures import agree, figures_of
 from real_tank import write_real_job
 
 import tankcal
@@ -19,6 +20,7 @@ from tankcal.tank.capacity import Capacity
 
 ROWS, DELIVERIES, DELIVERED_M = 10, 5, 2.0
 TOTAL = ROWS - 1
+PLACES = {"quarters": 1, "fifths": 2, "5 %": 3}  # columns of docs/uncertainty.md
 FULL = 78  # splits in halves; of fewer the part beyond U is known less well
 
 pytestmark = pytest.mark.study
@@ -97,7 +99,10 @@ def test_halves_agree_within_their_u(survey, figure):
         scatter = np.sqrt(np.mean((2 * part) ** 2))
         figure(f"halves, {name}: part with |E_n| > 1, rms of 2 E_n", f"{beyond:.3f} {scatter:.2f}")
         assert 0.8 < scatter < 1.3
-        assert beyond < 0.10 + 2 * its_sd * (len(shares) < FULL)
+        (most,) = figures_of(
+            "docs/uncertainty.md", "|E_n| exceeds 1 in at most () % of rows and of deliveries"
+        )
+        assert beyond < int(most) / 100 + 2 * its_sd * (len(shares) < FULL)
 
 
 def test_rings_at_one_height_are_within_u(survey, whole, zeta, figure):
@@ -112,6 +117,19 @@ def test_rings_at_one_height_are_within_u(survey, whole, zeta, figure):
         figure(f"rings at the {name}: ppm off, U, worst row in U",
                f"{ppm[0]:.0f} {ppm[1]:.0f} {np.abs(off[:ROWS]).max():.2f}")  # fmt: skip
         assert np.all(np.abs(off) < 1)
+        printed = {
+            "middle": figures_of("docs/uncertainty.md", "| rings at mid height | () | () |"),
+            "ends": figures_of(
+                "docs/uncertainty.md",
+                "| rings at the ends of the courses | () (no row by more than () U) | () |",
+            ),
+            "three": figures_of(
+                "docs/uncertainty.md", "| three rings | () | () | | without the points"
+            ),
+        }[name]
+        assert agree(ppm, [printed[0], printed[-1]])
+        if name == "ends":
+            assert agree([np.abs(off[:ROWS]).max()], [printed[1]])
 
 
 def test_a_station_less_is_within_u(survey, whole, figure):
@@ -119,27 +137,43 @@ def test_a_station_less_is_within_u(survey, whole, figure):
     names, xy = np.array(survey.job.points.names), survey.job.points.xyz_m[:, :2]
     stations = xy[[bool(name.startswith("st")) for name in names]]
     nearest = np.hypot(*(xy[:, None] - stations).transpose(2, 0, 1)).argmin(axis=1)
+    every = []
     for station in range(len(stations)):
         volume, expanded = survey.table_of(nearest != station)
         off = volume - whole[0]
         ppm = 1e6 * np.array([off[TOTAL], expanded[TOTAL]]) / whole[0][TOTAL]
         figure(f"without station {station + 1}: ppm off, U", f"{ppm[0]:.0f} {ppm[1]:.0f}")
         assert np.all(np.abs(off) < expanded)
+        every.append(np.abs(ppm))
+    least, most = np.min(every, axis=0), np.max(every, axis=0)
+    printed = figures_of(
+        "docs/uncertainty.md",
+        "without the points of one of four stations | () to () | () to () |",
+    )
+    assert agree([least[0], most[0], least[1], most[1]], printed)
 
 
 def test_the_bulge_is_the_same_in_all_courses(survey, zeta, figure):
     """The excess at mid course does not fall upwards, as a rest of the widening by filling does."""
+    of_page = figures_of(
+        "docs/uncertainty.md",
+        "the real shell: estimate (its standard uncertainty) | () (()) | () (()) | () (()) | () "
+        "(()) |",
+    )
+    stated = [of_page[i : i + 2] for i in (0, 2, 4, 6)]
     for height, places in (
         ("quarters", (-0.5, 0.5)),
         ("fifths", (-0.6, 0.6)),
         ("5 %", (-0.9, 0.9)),
     ):
         excess, covariance = _excess_at(places, survey, zeta)
+        assert agree([excess.mean(), np.sqrt(covariance.mean())], stated[PLACES[height]])
         figure(f"excess at the {height}, mean and its sd, mm",
                f"{excess.mean():+.2f} {np.sqrt(covariance.mean()):.2f}")  # fmt: skip
     excess, covariance = _excess_at((0.0,), survey, zeta)
     courses = np.arange(len(excess)) - (len(excess) - 1) / 2
     mean = excess.mean(), np.sqrt(covariance.mean())
+    assert agree(mean, stated[0])
     weights = np.linalg.inv(covariance)
     by = np.column_stack([np.ones(len(excess)), courses])
     cofactor = np.linalg.inv(by.T @ weights @ by)

@@ -11,6 +11,7 @@ from draws import draws
 from generated_walls import job_of, make_wall, survey
 from independent_shells import make_shell
 from numpy.polynomial.legendre import leggauss
+from page_figures import agree, figures_of, value_of
 from test_coverage_of_walls import ROWS, judged
 
 from tankcal.geometry.field.components import COMPONENTS, Heights
@@ -20,6 +21,34 @@ from tankcal.pipeline.wall.finding import find_wall
 HEIGHTS = {"middle": (0.5,), "quarters": (0.25, 0.75), "fifths": (0.2, 0.8), "joints": (0.05, 0.95)}
 INDEPENDENT = ("settled", "flat-plates", "filled")
 WITHOUT_BULGE = ("brick", "dents", "buckle")
+
+
+ROWS_OF_PAGE = {
+    "settled": (
+        "docs/uncertainty.md",
+        "(`tests/support/independent_shells.py`) | () (()) | () (()) | () (()) | () (()) |",
+    ),
+    "flat-plates": (
+        "docs/uncertainty.md",
+        "flat plates, joints drawn in | () (()) | () (()) | () (()) | () (()) |",
+    ),
+    "filled": (
+        "docs/uncertainty.md",
+        "bulge left by filling | () (()) | () (()) | () (()) | () (()) |",
+    ),
+    "brick": (
+        "docs/uncertainty.md",
+        "without its added bulge) | () (()) | () (()) | () (()) | () (()) |",
+    ),
+    "dents": (
+        "docs/uncertainty.md",
+        "dents, the same | () (()) | () (()) | () (()) | () (()) |",
+    ),
+    "buckle": (
+        "docs/uncertainty.md",
+        "buckles at mid course, the same | () (()) | () (()) | () (()) | () (()) |",
+    ),
+}
 
 
 def excess_mm(shell):
@@ -56,6 +85,19 @@ def test_the_bias_at_few_heights_depends_on_the_kind_of_shell_study(figure):
         for name, those in at[family].items():
             figure(f"excess at {name}, {family}, mm: mean, sd of shells, part above 0",
                    f"{those.mean():+.2f} {those.std():.2f} {np.mean(those > 0):.2f}")  # fmt: skip
+    (full,) = map(
+        int,
+        figures_of(
+            "docs/uncertainty.md",
+            "(In brackets: standard deviation between () shells of a family",
+        ),
+    )
+    for family, row in ROWS_OF_PAGE.items():
+        stated = [*map(value_of, figures_of(*row))]
+        for name, mean, sd in zip(HEIGHTS, stated[::2], stated[1::2], strict=True):
+            those = at[family][name]
+            error = max(sd, those.std()) * np.sqrt(1 / len(those) + 1 / full)
+            assert abs(those.mean() - mean) < 3.3 * error + 0.005, (family, name)
     middle = {family: those["middle"] for family, those in at.items()}
     assert middle["flat-plates"].mean() > 0.2
     assert middle["brick"].mean() > 0.3
@@ -94,6 +136,14 @@ def _prior_mean_mm():
     bulge = next(one for one in COMPONENTS if one.name == "common bulge")
     amplitude = bulge.median_m * np.exp(bulge.log_sd**2 / 8)  # of a log-normal variance
     return 1e3 * amplitude * bulge.height_columns(Heights(np.zeros(1), np.full(1, 0.5)))[0, 0]
+
+
+def test_the_prior_mean_of_the_bulge_is_stated():
+    printed = figures_of(
+        "docs/uncertainty.md",
+        "A correction by the prior mean of the common bulge would be () mm",
+    )
+    assert agree([_prior_mean_mm()], printed)
 
 
 def test_a_bulge_of_one_millimetre_has_its_closed_form():

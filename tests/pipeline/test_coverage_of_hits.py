@@ -12,7 +12,8 @@ import pytest
 from draws import draws
 from generated_hits import hit_job
 from generated_walls import make_wall
-from test_coverage_of_walls import judged, least_in_class, study
+from page_figures import figures_of
+from test_coverage_of_walls import assert_as_stated, judged, least_in_class, study
 
 from tankcal.methods.hits.wall import sight_wall
 from tankcal.pipeline.tanks import body_of
@@ -62,3 +63,8 @@ def test_intervals_hold_on_walls_that_are_not_the_model_study(tmp_path, figure, 
     assert min(parts) > 0.94 - 3 * np.sqrt(0.95 * 0.05 / count)
     assert min(classes) >= least_in_class(walls, len(classes))
     assert wide < 1.8
+    if not straps:
+        full, *stated = figures_of(
+            "docs/uncertainty.md", "| wall hits from one set-up | () | (), (), () | () |"
+        )
+        assert_as_stated(parts, wide, count, stated, int(full))

@@ -19,6 +19,7 @@ import test_coverage_of_walls as by_points
 from draws import draws
 from independent_shells import FAMILIES, NARROW_M, add_measured_bulge, make_shell, settle
 from joined_jobs import outside_job
+from page_figures import figures_of, ratios_agree, shares_agree
 from test_coverage_of_walls import ROWS, Found, judged
 
 from tankcal.errors import TankcalError
@@ -89,6 +90,37 @@ SURVEYS = {
 }
 
 
+ROWS_OF_PAGE = {
+    "points, one ring": (
+        "docs/uncertainty.md",
+        "| points, one ring per course | (), (), () | () |",
+    ),
+    "points, two rings": ("docs/uncertainty.md", "| points, two rings | (), (), () | () |"),
+    "points, three rings": ("docs/uncertainty.md", "| points, three rings | (), (), () | () |"),
+    "straps, two a course": (
+        "docs/uncertainty.md",
+        "| straps, two per course | (), (), () | () |",
+    ),
+    "straps, one a course": (
+        "docs/uncertainty.md",
+        "| straps, one per course | (), (), () | () |",
+    ),
+    "lines and one strapped course": (
+        "docs/uncertainty.md",
+        "| reference lines and one strapped course | (), (), () | () |",
+    ),
+    "hits, one set-up inside": (
+        "docs/uncertainty.md",
+        "| wall hits, one set-up inside | (), (), () | () |",
+    ),
+    "hits, untied set-ups outside": (
+        "docs/uncertainty.md",
+        "| wall hits, four to six untied set-ups outside | (), (), () | () |",
+    ),
+    "tangents": ("docs/uncertainty.md", "| tangents | (), (), () | () | The table is from"),
+}
+
+
 @dataclass(frozen=True)
 class Judged:
     """A table against the truth; found None: the survey was refused, for the reason in `refusal`.
@@ -142,12 +174,12 @@ def study(method, shells, folder, figure):
     each = [
         survey_shell(method, FAMILIES[i % len(FAMILIES)], i, folder / "job") for i in range(shells)
     ]
-    for name, value in figures_of(each).items():
+    for name, value in summaries_of(each).items():
         figure(f"{method}, {shells} shells: {name}", value)
     return each
 
 
-def figures_of(each):
+def summaries_of(each):
     """{name: text} of `Judged`s of one method."""
     kept = [one for one in each if one.found is not None]
     narrow = [one for one in kept if one.radius_m < NARROW_M[1]]
@@ -258,5 +290,19 @@ def test_intervals_hold_on_independent_shells_study(tmp_path, figure, method):
     each = study(method, shells, tmp_path, figure)
     assert all(one.found is not None for one in each)
     assert not any(one.is_silent for one in each)
+    (far,) = figures_of("docs/uncertainty.md", "an error of more than () U is marked DOUBTFUL")
+    assert float(far) == FAR
     assert min(held_of(each)) > LEAST_HELD - 3 * np.sqrt(LEAST_HELD * (1 - LEAST_HELD) / shells)
     assert width_of(each) < WIDEST * (1 + 3 / np.sqrt(2 * shells))
+    *stated, ratio = figures_of(*ROWS_OF_PAGE[method])
+    full, of_untied = map(
+        int,
+        figures_of(
+            "docs/uncertainty.md",
+            "The table is from () shells for each method (() for untied set-ups)",
+        ),
+    )
+    # half of the drawn shells have the measured bulge, and count for a third of the population
+    full = (of_untied if "untied" in method else full) / 2
+    assert shares_agree(held_of(each), stated, shells / 2, full), (held_of(each), stated)
+    assert ratios_agree(width_of(each), ratio, shells / 2, full), (width_of(each), ratio)

@@ -11,7 +11,8 @@ import pytest
 from draws import draws
 from generated_walls import make_wall
 from joined_jobs import ring_job, sighted, untied_job, whole_job
-from test_coverage_of_walls import judged, least_in_class, study
+from page_figures import figures_of
+from test_coverage_of_walls import assert_as_stated, judged, least_in_class, study
 
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall.finding import find_wall
@@ -74,7 +75,18 @@ def test_intervals_hold_on_walls_that_are_not_the_model(tmp_path, figure, method
 @pytest.mark.parametrize("method", JOBS)
 def test_intervals_hold_on_walls_that_are_not_the_model_study(tmp_path, figure, method):
     walls = draws(1, 50)
-    parts, _, classes = study(walls, tmp_path, figure, found_of=partial(found_of, method=method))
+    parts, wide, classes = study(walls, tmp_path, figure, found_of=partial(found_of, method=method))
     count = walls * len(classes)
     assert min(parts) > 0.94 - 3 * np.sqrt(0.95 * 0.05 / count)
     assert min(classes) >= least_in_class(walls, len(classes))
+    rows = {
+        "untied hits": figures_of(
+            "docs/uncertainty.md", "| wall hits from three untied set-ups | () | (), (), () | () |"
+        ),
+        "hits, straps and lines": figures_of(
+            "docs/uncertainty.md", "| hits, two straps and lines together | () | (), (), () | () |"
+        ),
+    }
+    if method in rows:
+        full, *stated = rows[method]
+        assert_as_stated(parts, wide, count, stated, int(full))

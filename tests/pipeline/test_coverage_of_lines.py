@@ -13,7 +13,8 @@ from draws import draws
 from generated_lines import plumbed_job
 from generated_strapping import shape_of
 from generated_walls import make_wall
-from test_coverage_of_walls import judged, least_in_class, study
+from page_figures import figures_of
+from test_coverage_of_walls import assert_as_stated, judged, least_in_class, study
 
 from tankcal.methods.strapping.wall import find_strapped_wall
 from tankcal.pipeline.tanks import body_of
@@ -45,8 +46,12 @@ def draw_job(rng, wall, lines, folder, faces=2):
 
 @pytest.mark.slow
 def test_intervals_hold_on_walls_that_are_not_the_model(tmp_path, figure):
-    parts, _, _ = study(1, tmp_path, figure, found_of=found_of)
+    parts, wide, classes = study(1, tmp_path, figure, found_of=found_of)
     assert min(parts) > 0.94 - 3 * np.sqrt(0.95 * 0.05 / 15)
+    full, *stated = figures_of(
+        "docs/uncertainty.md", "| straps and lines, both faces | () | (), (), () | () |"
+    )
+    assert_as_stated(parts, wide, len(classes), stated, int(full))
 
 
 @pytest.mark.study
@@ -57,3 +62,8 @@ def test_intervals_hold_with_a_declared_collimation_study(tmp_path, figure):
     assert min(parts) > 0.94 - 3 * np.sqrt(0.95 * 0.05 / count)
     assert min(classes) >= least_in_class(walls, len(classes))
     assert wide < 1.8
+    full, *stated = figures_of(
+        "docs/uncertainty.md",
+        '| the same on one face, collimation of 6" declared | () | (), (), () | () |',
+    )
+    assert_as_stated(parts, wide, count, stated, int(full))

@@ -17,6 +17,7 @@ from generated_solids import (
     survey_ball,
     survey_lying,
 )
+from page_figures import figures_of, ratios_agree, shares_agree
 
 from tankcal.pipeline.solids.scan import fit_scan
 from tankcal.pipeline.tanks import body_of
@@ -103,3 +104,10 @@ def test_intervals_hold_on_solids_that_are_not_the_model_study(kind, tmp_path, f
     assert held[:, -1].mean() > least
     assert held.mean() > least
     assert wide[-1] < MOST_WIDE
+    (full,) = map(int, figures_of("docs/uncertainty.md", "| () of each | total held |"))
+    *stated, ratio = {
+        "lying": figures_of("docs/uncertainty.md", "| lying | () | () | () |"),
+        "sphere": figures_of("docs/uncertainty.md", "| sphere | () | () | () |"),
+    }[kind]
+    assert shares_agree([held[:, -1].mean(), held.mean()], stated, len(held), full)
+    assert ratios_agree(wide[-1], ratio, len(held), full)

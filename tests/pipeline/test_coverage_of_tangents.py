@@ -11,7 +11,8 @@ import pytest
 from draws import draws
 from generated_tangents import tangent_job
 from generated_walls import make_wall
-from test_coverage_of_walls import judged, least_in_class, study
+from page_figures import figures_of
+from test_coverage_of_walls import assert_as_stated, judged, least_in_class, study
 
 from tankcal.methods.tangents.wall import touch_wall
 from tankcal.pipeline.tanks import body_of
@@ -49,7 +50,9 @@ def test_intervals_hold_on_walls_that_are_not_the_model(tmp_path, figure):
 @pytest.mark.study
 def test_intervals_hold_on_walls_that_are_not_the_model_study(tmp_path, figure):
     walls = draws(1, 100)
-    parts, _, classes = study(walls, tmp_path, figure, found_of=found_of)
+    parts, wide, classes = study(walls, tmp_path, figure, found_of=found_of)
     count = walls * len(classes)
     assert min(parts) > 0.94 - 3 * np.sqrt(0.95 * 0.05 / count)
     assert min(classes) >= least_in_class(walls, len(classes))
+    full, *stated = figures_of("docs/uncertainty.md", "| tangents | () | (), (), () | () |")
+    assert_as_stated(parts, wide, count, stated, int(full))

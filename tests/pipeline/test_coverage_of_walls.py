@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from draws import draws
 from generated_walls import FAMILIES, job_of, make_wall, survey
+from page_figures import figures_of, ratios_agree, shares_agree, value_of
 from scipy.stats import binom
 
 from tankcal.pipeline.tanks import body_of
@@ -70,25 +71,40 @@ def judged(wall, body, family, rings):
     return Found(family, rings, (table.volume_m3 - truth) / total, table.U_m3 / total)
 
 
-def study(walls, folder, figure, rings=(1, 2, 3), found_of=found_of):
-    """Held shares over all, of totals by class, and how wide U is."""
+def study(walls, folder, figure, rings=(1, 2, 3), found_of=found_of, each=None):
+    """Held shares over all, of totals by class, and how wide U is; `each` receives all `Found`."""
     rng = np.random.default_rng(2026)
     found = [
         found_of(rng, family, count, folder)
         for family, count in product(FAMILIES, rings)
         for _ in range(walls)
     ]
+    if each is not None:
+        each.extend(found)
     held = np.array([np.abs(one.error) <= one.expanded for one in found])
     totals = held[:, ROWS - 1]
     for family, count in product(FAMILIES, rings):
         mine = [one.family == family and one.rings == count for one in found]
         figure(f"held totals, {family}, {count} rings, {walls} walls", f"{totals[mine].mean():.3f}")
-    error = np.array([one.error[ROWS - 1] for one in found])
-    wide = np.mean([one.expanded[ROWS - 1] for one in found]) / 1.96 / np.sqrt(np.mean(error**2))
-    parts = totals.mean(), held[:, :ROWS].mean(), held[:, ROWS:].mean()
+    parts, wide = shares_of(found)
     figure("held totals, rows, deliveries of all", " ".join(f"{part:.3f}" for part in parts))
     figure("mean U over 1.96 rms errors of totals", f"{wide:.2f}")
     return parts, wide, totals.reshape(len(FAMILIES) * len(rings), walls).mean(axis=1)
+
+
+def shares_of(found):
+    """Held shares of totals, rows and deliveries, and mean U over 1.96 rms errors of totals."""
+    held = np.array([np.abs(one.error) <= one.expanded for one in found])
+    error = np.array([one.error[ROWS - 1] for one in found])
+    wide = np.mean([one.expanded[ROWS - 1] for one in found]) / 1.96 / np.sqrt(np.mean(error**2))
+    return (held[:, ROWS - 1].mean(), held[:, :ROWS].mean(), held[:, ROWS:].mean()), wide
+
+
+def assert_as_stated(parts, wide, count, stated, full):
+    """Shares and ratio of `count` tanks are those of `full` tanks on a page, by sampling error."""
+    *shares, ratio = stated
+    assert shares_agree(parts, shares, count, full), (parts, shares)
+    assert ratios_agree(wide, ratio, count, full), (wide, ratio)
 
 
 def least_in_class(walls, classes):
@@ -108,8 +124,19 @@ def test_intervals_hold_on_walls_that_are_not_the_model(tmp_path, figure):
 
 @pytest.mark.study
 def test_intervals_hold_on_walls_that_are_not_the_model_study(tmp_path, figure):
-    walls = draws(3, 200)
-    parts, wide, classes = study(walls, tmp_path, figure)
+    walls, each = draws(3, 200), []
+    parts, wide, classes = study(walls, tmp_path, figure, each=each)
+    (full,) = map(value_of, figures_of("docs/uncertainty.md", "The table is from () walls"))
+    stated = {
+        1: figures_of("docs/uncertainty.md", "| one ring a course | () | () | () | () |"),
+        2: figures_of("docs/uncertainty.md", "| two rings | () | () | () | () |"),
+        3: figures_of("docs/uncertainty.md", "| three rings | () | () | () | () |"),
+    }
+    for rings, row in stated.items():
+        mine = [one for one in each if one.rings == rings]
+        assert_as_stated(*shares_of(mine), len(mine), row, full / 3)
+    row = figures_of("docs/uncertainty.md", "| all | () | () | () | () |")
+    assert_as_stated(parts, wide, len(each), row, full)
     count = walls * len(classes)
     assert min(parts) > LEAST_HELD - 3 * np.sqrt(0.95 * 0.05 / count)
     assert min(classes) >= least_in_class(walls, len(classes))

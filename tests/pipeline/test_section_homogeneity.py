@@ -9,6 +9,7 @@ import pytest
 from conftest import EXAMPLE
 from draws import draws
 from generated_walls import FAMILIES, job_of, make_wall, survey
+from page_figures import figures_of
 from scipy.interpolate import CubicSpline
 from scipy.stats import chi2
 
@@ -203,6 +204,11 @@ def test_form_of_valid_walls_is_no_noise_study(tmp_path, figure):
     count = draws(200, 2000)
     share = share_accused(count, tmp_path)
     figure(f"valid surveys whose sections are called unequal, of {count}", f"{share:.4f}")
+    (percent,) = figures_of(
+        "docs/uncertainty.md",
+        "(six families outside the model), at most () % are reported as unequal",
+    )
+    assert int(percent) == 100 * SHARE_ACCUSED
     assert share <= SHARE_ACCUSED
 
 
@@ -216,4 +222,10 @@ def test_a_course_of_other_noise_is_found(factor, tmp_path, figure):
     """
     found = [bool(codes_of(drawn_job(s, tmp_path, factor, (0.008, 0.014)))) for s in range(12)]
     figure(f"courses of {factor} times the noise that are found, of 12", f"{np.mean(found):.2f}")
+    stated = figures_of(
+        "docs/uncertainty.md",
+        "Three times the noise in one course is detected in () of () surveys, a fifth of the noise "
+        "in () of ()",
+    )
+    assert [sum(found), len(found)] == [*map(int, stated[:2] if factor > 1 else stated[2:])]
     assert np.mean(found) > 0.7
