@@ -290,7 +290,7 @@ def form(columns, rows):
     return Block({"kind": "form", "columns": heads, "rows": int(rows)})
 
 
-def chart(title, facts, heads, rows, *, across, size_pt, note=""):
+def chart(title, facts, heads, rows, *, across, size_pt, note="", marked=()):
     """Chart for the wall: a title and facts in large letters, and pairs side by side.
 
     Parameters
@@ -309,6 +309,8 @@ def chart(title, facts, heads, rows, *, across, size_pt, note=""):
         Type size of the pairs, points.
     note : str, optional
         Text below the pairs.
+    marked : sequence of int, optional
+        Indices, from 0, of hatched rows.
 
     Returns
     -------
@@ -318,7 +320,7 @@ def chart(title, facts, heads, rows, *, across, size_pt, note=""):
     return Block({
         "kind": "chart", "title": _text(title), "facts": facts, "heads": list(heads[0]),
         "rows": [list(row) for row in rows], "across": across, "size_pt": size_pt,
-        "note": _text(note),
+        "note": _text(note), "marked": list(marked),
     })  # fmt: skip
 
 

@@ -5,6 +5,7 @@ between two rows of the table are interpolated linearly and rounded to litres on
 """
 
 import math
+from bisect import bisect_left
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +30,9 @@ _ACROSS = range(1, 10)  # numbers of columns side by side
 _MOST_PT = 20.0  # largest type
 
 
-def write_chart(source, out, language=None, product=None, step_cm=1, *, by_ullage=False):
+def write_chart(
+    source, out, language=None, product=None, step_cm=1, *, by_ullage=False, water_mm=None
+):
     """Write the field chart of a record as a PDF.
 
     Parameters
@@ -46,6 +49,9 @@ def write_chart(source, out, language=None, product=None, step_cm=1, *, by_ullag
         Centimetres between two rows.
     by_ullage : bool, optional
         True: the rows are ullages from the reference height in place of dips.
+    water_mm : int, optional
+        Millimetres between two rows of a table of free water, from the lowest dip of the table to
+        the end of the page; None: the chart of the product.
 
     Returns
     -------
@@ -70,7 +76,15 @@ def write_chart(source, out, language=None, product=None, step_cm=1, *, by_ullag
             "the record has no reference height; expected a job with datum.reference_height_m",
         )
         raise InputError(Problem("--ullage", text))
-    rows = chart_rows(record, step_cm, by_ullage=by_ullage)
+    if water_mm is None:
+        rows = chart_rows(record, step_cm, by_ullage=by_ullage)
+    else:
+        rows = water_rows(record, water_mm)
+    if not rows:
+        text = message(
+            "chart_no_rows", "no dip of the chart is in the table; expected a smaller step"
+        )
+        raise InputError(Problem(source.name, text))
     if len(rows) > MOST_ROWS:
         text = message(
             "chart_many_rows",
@@ -79,7 +93,8 @@ def write_chart(source, out, language=None, product=None, step_cm=1, *, by_ullag
         )  # fmt: skip
         raise InputError(Problem("--step-cm", text))
     language = language or language_of(record)
-    shown = pages(record, rows, language, product, digest_of(source), by_ullage=by_ullage)
+    kind = "water" if water_mm is not None else "ullage" if by_ullage else "dip"
+    shown = pages(record, rows, language, product, digest_of(source), kind=kind)
     content = pdf([block.data for block in shown], source.parent)
     with replace_file(Path(out)) as temporary:
         temporary.write_bytes(content)
@@ -110,7 +125,22 @@ def chart_rows(record, step_cm=1, *, by_ullage=False):
     ]
 
 
-def pages(record, rows, language, product=None, digest="", *, by_ullage=False):
+def water_rows(record, step_mm=1):
+    """Rows (mm, litres) of a table of free water, from the lowest dip of the table.
+
+    The table ends with the page, with the table of the tank, or where a floating roof would rest in
+    the water: its displacement is part of the volumes above.
+    """
+    capacity, critical = record["capacity"], critical_zone(record)
+    heights = capacity["height_m"]
+    low, high = heights[0], critical[0] if critical else heights[-1]
+    first, last = math.ceil(1000 * low - 1e-6), math.floor(1000 * high + 1e-6)
+    shown = [mm for mm in range(first, last + 1) if mm % step_mm == 0][:MOST_ROWS]
+    litres = 1000 * np.interp(np.array(shown) / 1000, heights, capacity["volume_m3"])
+    return list(zip(shown, litres.tolist(), strict=True))
+
+
+def pages(record, rows, language, product=None, digest="", *, kind="dip"):
     """Return the blocks of the page.
 
     Parameters
@@ -118,15 +148,15 @@ def pages(record, rows, language, product=None, digest="", *, by_ullage=False):
     record : dict
         Loaded record.json.
     rows : list of (int, float or None)
-        Result of `chart_rows`.
+        Result of `chart_rows` or `water_rows`.
     language : str
         One of `shipped.LANGUAGES`.
     product : str, optional
         Name of the product; None: that of the job.
     digest : str, optional
         SHA-256 of the record.
-    by_ullage : bool, optional
-        Whether the rows are ullages.
+    kind : {"dip", "ullage", "water"}, optional
+        Kind of the rows.
 
     Returns
     -------
@@ -136,7 +166,7 @@ def pages(record, rows, language, product=None, digest="", *, by_ullage=False):
     paper, job = PlainPaper(words), record["job"]
     marks, certificate = paper.marks, job["certificate"]
     tank = job["tank"]
-    title = paper.word("chart.title_of_ullage" if by_ullage else "chart.title")
+    title = paper.word(f"chart.title_of_{kind}")
     product = product or tank["details"].get("product") or ""
     survey = (job["survey"] or {}).get("date")
     day = certificate.get("date_of_issue") or survey
@@ -144,13 +174,12 @@ def pages(record, rows, language, product=None, digest="", *, by_ullage=False):
         (paper.word("chart.product"), product or NOTHING),
         (paper.word("chart.number"), certificate.get("number") or NOTHING),
         (paper.word("chart.date"), NOTHING if day is None else str(day)[:10]),
-        (paper.word("chart.uncertainty"), _uncertainty(paper, record)),
+        (paper.word("chart.uncertainty"), _uncertainty(paper, record, rows, kind)),
     ]
     temperature = shortest(job["table"]["reference_temperature_c"], marks)
-    texts = [paper.word("chart.use", temperature=temperature)]
-    if by_ullage:
-        reference = fixed(job["datum"]["reference_height_m"], 3, marks)
-        texts = [paper.word("chart.use_ullage", temperature=temperature, reference=reference)]
+    reference = job["datum"]["reference_height_m"]
+    values = {"reference": fixed(reference, 3, marks)} if kind == "ullage" else {}
+    texts = [paper.word(f"chart.use_{kind}", temperature=temperature, **values)]
     if any(litres is None for _, litres in rows):
         texts.append(paper.word("chart.critical", sign=NOTHING))
     cells = [
@@ -171,20 +200,25 @@ def pages(record, rows, language, product=None, digest="", *, by_ullage=False):
         blocks.chart(
             f"{paper.word('page.tank')} {tank['id']}",
             facts,
-            [("cm", "L")],
+            [("mm" if kind == "water" else "cm", "L")],
             cells,
             across=across,
             size_pt=size_pt,
             note=" ".join(texts),
+            marked=[place for place, (_, litres) in enumerate(rows) if litres is None],
         ),
     ]
 
 
-def _uncertainty(paper, record):
+def _uncertainty(paper, record, rows, kind):
     """Text of the largest U of the rows, in litres, with k and the coverage probability."""
     capacity = record["capacity"]
     U = stated_U_m3(capacity)
-    row = max(range(len(U)), key=U.__getitem__)
+    count = len(U)
+    if kind == "water":  # the rows of the tank that the page contains, and the next row
+        highest = rows[-1][0] / 1000 if rows else capacity["height_m"][0]
+        count = min(bisect_left(capacity["height_m"], highest) + 1, count)
+    row = max(range(count), key=U.__getitem__)
     largest = format_significant(1000 * U[row], 2, paper.marks)
     k = k_of_rows(capacity)[row]
     values = {"U": largest, "coverage": paper.word("chart.probability", percent=shortest(

@@ -11,7 +11,7 @@ from calculated_tanks import afloat, example_with_rows
 
 from tankcal.cli import main
 from tankcal.report.pdf import pdf
-from tankcal.report.station_chart import MOST_ROWS, chart_rows, layout, pages
+from tankcal.report.station_chart import MOST_ROWS, chart_rows, layout, pages, water_rows
 from tankcal.text.shipped import LANGUAGES
 
 READABLE_PT = 7.0  # smallest type of a chart with the most rows
@@ -110,3 +110,54 @@ def test_ullages_need_a_reference_height(tank, tmp_path, capsys):
     assert main(["chart", str(source), "--ullage", "--step-cm", "5", "--language", "en", "--out",
                  str(tmp_path / "chart.pdf")]) == 2  # fmt: skip
     assert "reference height" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_critical_zone_is_hatched_and_explained(tmp_path, language):
+    record = afloat(tmp_path)[1]
+    rows = chart_rows(record, 4)
+    *_, chart = pages(record, rows, language)
+    low, high = (line["value"] for line in record["roof"] if line["code"].startswith("roof_crit"))
+    expected = [place for place, (cm, _) in enumerate(rows) if low < cm / 100 < high]
+    assert chart.data["marked"] == expected
+    assert expected
+    word = {"en": "hatched", "es": "rayado", "pt-BR": "hachurado"}[language]
+    assert word in chart.data["note"]
+    # The hatching is a pattern of lines, which a print in black and white shows.
+    (page,) = pypdf.PdfReader(
+        io.BytesIO(pdf([block.data for block in pages(record, rows, language)]))
+    ).pages
+    assert "/Pattern" in page["/Resources"]
+
+
+def test_a_water_table_has_the_volumes_of_the_table_at_each_millimetre(tank):
+    record, _ = tank
+    capacity = record["capacity"]
+    rows = water_rows(record)
+    assert [mm for mm, _ in rows] == list(range(MOST_ROWS))
+    slope = 1000 * (capacity["volume_m3"][1] - capacity["volume_m3"][0]) / 200  # rows of 0.2 m
+    first = 1000 * capacity["volume_m3"][0]
+    assert dict(rows)[137] == pytest.approx(first + 137 * slope, rel=1e-12)
+    assert [mm for mm, _ in water_rows(record, 5)][:3] == [0, 5, 10]
+
+
+def test_a_water_table_ends_below_the_roof(tmp_path):
+    record = afloat(tmp_path)[1]
+    assert water_rows(record, 5)[-1][0] == 1000  # the critical zone begins at 1 m
+
+
+def test_the_command_writes_a_water_table_with_the_U_of_its_rows(tank, tmp_path, capsys):
+    record, source = tank
+    out = tmp_path / "water.pdf"
+    chart = ["chart", str(source), "--language", "en", "--out", str(out)]
+    assert main([*chart, "--water"]) == 0
+    assert "400 rows" in capsys.readouterr().out
+    (page,) = pypdf.PdfReader(out).pages
+    text = page.extract_text()
+    assert "Table of free water" in text
+    U = 1000 * max(record["capacity"]["U_m3"][:3])  # rows at 0, 0.2 and 0.4 m
+    assert f"U = {U:.2g} L at most" in text or f"U = {U:.0f} L at most" in text
+    for options, named in ((["--water", "--ullage", "--step-cm", "5"], "--step-cm"),
+                           (["--step-mm", "2"], "--step-mm")):  # fmt: skip
+        assert main([*chart, *options]) == 2
+        assert f"{named}: " in capsys.readouterr().err

@@ -39,7 +39,20 @@ def add(commands):
         help="ullages from the reference height in place of dips",
     )
     parser.add_argument(
-        "--out", metavar="FILE", help="output file (default: TANK-chart.pdf in this folder)"
+        "--water",
+        action="store_true",
+        help="free water in place of the product: litres at each millimetre of water dip",
+    )
+    parser.add_argument(
+        "--step-mm",
+        metavar="N",
+        type=parse_several,
+        help="with --water, millimetres between two rows (default: 1)",
+    )
+    parser.add_argument(
+        "--out",
+        metavar="FILE",
+        help="output file (default: TANK-chart.pdf or TANK-water.pdf in this folder)",
     )
     add_language(parser)
     add_json(parser)
@@ -53,18 +66,20 @@ def _chart(options):
     from tankcal.report.station_chart import write_chart
     from tankcal.text.naming import file_name
 
+    _refuse_other_steps(options)
     source = record_file(options.record)
     speak_of_record(options.language, source)
     out = options.out
     if out is None:
-        out = f"{file_name((records.load(source)['job']['tank'] or {}).get('id', ''))}-chart.pdf"
+        name = file_name((records.load(source)["job"]["tank"] or {}).get("id", ""))
+        out = f"{name}-{'water' if options.water else 'chart'}.pdf"
     out = Path(out)
     if out.suffix.lower() != ".pdf" or out.is_dir():
         expected = message("chart_out", "expected the name of a .pdf file")
         raise InputError(Problem("--out", expected))
     count = write_chart(
         source, out, options.language, options.product, options.step_cm or 1,
-        by_ullage=options.ullage,
+        by_ullage=options.ullage, water_mm=(options.step_mm or 1) if options.water else None,
     )  # fmt: skip
     if options.machine:
         print_json(exit_status=0, rows=count, files=[str(out)])
@@ -72,3 +87,16 @@ def _chart(options):
     say(message("chart_written", "{count} rows on a page", count=count))
     print(f"  {printable(out)}")
     return 0
+
+
+def _refuse_other_steps(options):
+    """Refuse options that the chosen kind of chart does not use."""
+    if options.water:
+        text = message("chart_beside_water", "not used with --water; expected no such option")
+        unused = {"--ullage": options.ullage, "--step-cm": options.step_cm}
+    else:
+        text = message("chart_without_water", "only used with --water; expected --step-cm")
+        unused = {"--step-mm": options.step_mm}
+    problems = [Problem(name, text) for name, value in unused.items() if value]
+    if problems:
+        raise InputError(problems)
