@@ -38,7 +38,7 @@ def type_of(dof):
 
 @dataclass(frozen=True)
 class Source:
-    """One source of uncertainty, with one or more columns of the factor of the covariance.
+    """A source of uncertainty, with its columns of the factor of the covariance.
 
     Attributes
     ----------

@@ -43,7 +43,11 @@ SOURCE = (
     Field("verified", "flag", "whether it was read in the legal or technical text itself"),
 )
 # Keys of the file of a decision rule: [rule], and [PART.NAME] for the parts of LIMITS.
-RULE = (*HEAD, positive("largest_capacity_m3", "largest tank it is for", 1e9))
+RULE = (
+    *HEAD,
+    positive("largest_capacity_m3", "largest tank it is for", 1e9),
+    Field("statements", "names", "sentences that it requires in a certificate, in its language"),
+)
 _SHARED = (Field("tanks", "names", "kinds of tank that it is for"), *SOURCE)
 _PERCENT = positive("limit_percent", "limit in percent", 100)
 LIMITS = {
@@ -331,6 +335,7 @@ def _make_rule(head, limits, file):
         verified=all(values["verified"] for _, _, values in limits),
         remark=head["remark"],
         largest_capacity_m3=head["largest_capacity_m3"],
+        statements=head["statements"] or (),
         uncertainty=tuple(
             UncertaintyLimit(
                 of=values["of"],

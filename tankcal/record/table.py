@@ -265,6 +265,9 @@ class RuleOfTable(Saved):
     verified: bool = key("whether all values were read in the legal text itself")
     remark: str = key("to be printed with the rule")
     largest_capacity_m3: float | None = key("of tanks to which it applies; null: all")
+    statements: list[str] | None = key(
+        "required in a certificate, as written there", optional=True, default=None
+    )
 
 
 class UncertaintyJudged(Saved):
@@ -469,7 +472,7 @@ def rule_of(verdict):
     return verdict and fill_from(
         TableJudged,
         verdict,
-        rule=fill_from(RuleOfTable, verdict.rule),
+        rule=fill_from(RuleOfTable, verdict.rule, statements=verdict.rule.statements or None),
         uncertainty=[fill_from(UncertaintyJudged, judged) for judged in verdict.uncertainty],
         deviation=[fill_from(DeviationJudged, judged) for judged in verdict.deviation],
     )

@@ -14,6 +14,9 @@ from tankcal.report.tables.facts import (
     SURVEY_DATE,
     tank_facts,
 )
+from tankcal.report.uncertainty.method import missing_inputs
+from tankcal.report.uncertainty.stated import stated_U_m3
+from tankcal.text.digits import decimals_of
 
 TO_WRITE_ON = ""  # value that the page style prints as a blank line
 # Entries of [certificate] that other parts of the paper print.
@@ -50,6 +53,31 @@ def _is_in_head(paper, key, certificate):
     if key == "laboratory":
         return bool(certificate.get(key) or paper.letterhead)
     return key == "laboratory_address" and paper.letterhead and not certificate.get(key)
+
+
+def limits_of_u(paper):
+    """Sentences (str) of the first page on what U does not include, and on effects not corrected.
+
+    An effect whose correction is switched off has a known sign: the change of the capacity that
+    the correction would make.
+    """
+    texts = [paper.word("certificate.not_in_u")]
+    if missing := missing_inputs(paper):
+        texts.append(paper.word("certificate.undeclared", missing="; ".join(missing)))
+    U = stated_U_m3(paper.record["capacity"])[-1]
+    effects = [
+        paper.word(
+            "certificate.effect",
+            name=paper.word(f"corrections.{row['code']}"),
+            sign="+" if row["size_m3"] > 0 else "",
+            size=paper.number(row["size_m3"], "m3", decimals=decimals_of(U) + 1),
+        )
+        for row in paper.record["corrections"]
+        if not row["applied"] and row["size_m3"]
+    ]
+    if effects:
+        texts.append(paper.word("certificate.not_corrected", effects="; ".join(effects)))
+    return " ".join(texts)
 
 
 def doubtful_input(paper):
@@ -122,7 +150,9 @@ def statements(paper):
     """List of statements: items calibrated, copies of the certificate, and missing entries."""
     certificate = paper.record["job"]["certificate"]
     missing = [paper.label(key) for key in _ASKED_FOR if not certificate.get(key)]
+    rule = (paper.record.get("rule") or {}).get("rule", {})
     sentences = [paper.word("certificate.only_items"), paper.word("texts.copy")]
+    sentences += rule.get("statements", [])
     if missing:
         sentences.append(paper.word("certificate.not_given", missing=", ".join(missing)))
     return blocks.listing(sentences)

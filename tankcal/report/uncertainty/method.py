@@ -72,8 +72,8 @@ LARGER_PART = 0.5  # share of the variance above which an input determines a dis
 def sentences(paper, mark=MARK):
     """Return the sentences of the certificate on U and k (list of str).
 
-    `mark` is the mark of rows with a Monte Carlo interval. Details of the simulation are in the
-    working papers (`monte_carlo.sentence`).
+    `mark` is the mark of rows with a Monte Carlo interval. `monte_carlo.sentence` describes the
+    simulation.
     """
     record = paper.record
     simulated = {*flag_simulated(record["capacity"])}
@@ -177,11 +177,14 @@ def inputs(paper):
         shown_line = line | {"is_default": False} if group == "default" else line
         groups[group].append(_format_input(paper, shown_line))
     facts = [(f"inputs_{name}", "; ".join(texts)) for name, texts in groups.items()]
-    missing = [choice for choice in paper.record["choices"] if choice["code"] == "not_in_budget"]
-    names = [
-        paper.words["inputs"].get(name, name) for choice in missing for name in choice["value"]
-    ]
-    return [*facts, ("inputs_missing", "; ".join(names) or paper.word("texts.nothing_missing"))]
+    missing = "; ".join(missing_inputs(paper)) or paper.word("texts.nothing_missing")
+    return [*facts, ("inputs_missing", missing)]
+
+
+def missing_inputs(paper):
+    """Return the names of the inputs that affect the table and were not declared (list of str)."""
+    choices = [choice for choice in paper.record["choices"] if choice["code"] == "not_in_budget"]
+    return [paper.words["inputs"].get(name, name) for choice in choices for name in choice["value"]]
 
 
 def budget_lines(record):

@@ -190,14 +190,14 @@ def range_blocks(paper):
     """Sentence on the simulation, and table of the ranges of rows with equal verdict."""
     rows = ranges(paper.record)
     shown = rows[:MOST_RANGES]
-    found = [blocks.paragraph(sentence(paper)), paper.show(RANGES, shown)]
+    shown_blocks = [blocks.paragraph(sentence(paper)), paper.show(RANGES, shown)]
     if len(shown) < len(rows):
-        found.append(paper.paragraph("only_first_ranges", shown=len(shown), all=len(rows)))
+        shown_blocks.append(paper.paragraph("only_first_ranges", shown=len(shown), all=len(rows)))
     every = (*rows, *DELIVERIES.rows(paper.record))
     if not all(row["validated"] for row in every):
         digits = paper.record["monte_carlo"]["digits"]
-        found.append(paper.paragraph("why_not_validated", digits=digits))
-    return found
+        shown_blocks.append(paper.paragraph("why_not_validated", digits=digits))
+    return shown_blocks
 
 
 def delivery_blocks(paper):

@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from tankcal.report.certificate import doubts_of
+from tankcal.report.certificate import doubts_of, limits_of_u
 from tankcal.report.numbers import unit
 from tankcal.report.tables import overrulings
 from tankcal.report.tables.facts import REFERENCES, SURVEY, SURVEY_DATE, tank_facts
@@ -35,6 +35,7 @@ def certificate_sheet(book, record):
     sections = [
         *([DrawnPart(_draw_notice)] if book.notice else []),
         DrawnPart(partial(_draw_result, record), sentence(words, "headings", "result")),
+        Sentences([limits_of_u(paper)]),
         Sentences(
             doubts_of(record["warnings"]),
             title=words["certificate"]["doubtful"],

@@ -131,6 +131,8 @@ class Rule(RuleSet):
         Limits of a table.
     reference_height, periods
         Additional limits of a new table relative to the previous table.
+    statements : tuple of str
+        Sentences that the rule requires in a certificate, in the language of the rule.
     name, source, verified, remark
         As for a RuleSet.
     """
@@ -140,6 +142,7 @@ class Rule(RuleSet):
     deviation: tuple[DeviationLimit, ...]
     reference_height: tuple[ReferenceHeightLimit, ...] = ()
     periods: tuple[Period, ...] = ()
+    statements: tuple[str, ...] = ()
 
     @property
     def limits(self):
