@@ -9,6 +9,7 @@ from tankcal.job.checks import check_all
 from tankcal.job.checks.extent import has_survey, is_sighted, is_strapped
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.entries import ColumnValues, kind_of, read_columns, read_register, read_settings
+from tankcal.job.equipment import add_shared_register, equipment_used
 from tankcal.job.model.overrulings import Overruling
 from tankcal.job.rule_files import find_rule
 from tankcal.job.tables import (
@@ -47,10 +48,14 @@ def job_of(raw, log, is_whole=True):
     InputError
         With every problem in `log`.
     """
+    raw = add_shared_register(raw, log)
     registers = {name: read_register(raw, name, log) for name in REGISTERS}
     tables = _read_tables(raw, registers, is_whole, log)
     values = read_settings(raw, log, is_whole) if raw.settings is not None else None
     check_all(values, tables, registers, raw, is_whole, log)
+    equipment = (
+        () if values is None else equipment_used(values["survey"], registers["equipment"], raw, log)
+    )
     attached = _attached(raw, values, log) if is_whole else None
     log.stop_if_problems()
     measurements = None
@@ -61,7 +66,7 @@ def job_of(raw, log, is_whole=True):
     overrulings = make_overrulings(tables["overrulings"])
     if not is_whole:
         frame = make_frame(raw, values, tables, measurements, tuple(log.warnings))
-        return replace(frame, overrulings=overrulings)
+        return replace(frame, overrulings=overrulings, equipment=equipment)
     job = make_job(raw, values, tables, attached, measurements, tuple(log.warnings))
     by_attribute, by_method = {}, {}
     for method in methods_for(kind_of(raw)):  # two methods may share a table
@@ -69,7 +74,8 @@ def job_of(raw, log, is_whole=True):
             readings = method.read(values, tables, registers, raw)
             attributes = by_method if method.attribute is None else by_attribute
             attributes[method.attribute or method.name] = readings
-    return replace(job, overrulings=overrulings, surveys=by_method, **by_attribute)
+    parts = {"overrulings": overrulings, "equipment": equipment, "surveys": by_method}
+    return replace(job, **parts, **by_attribute)
 
 
 def _read_tables(raw, registers, is_whole, log):

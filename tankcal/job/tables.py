@@ -46,6 +46,7 @@ REGISTERS = {  # name of an entry in each list
     "instruments": "instrument",
     "clouds": "cloud",
     "meters": "meter",
+    "equipment": "item",
 }
 SETTINGS_FILE = "job.toml"
 SETTINGS_SHEET = "job"

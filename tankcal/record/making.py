@@ -9,6 +9,7 @@ from tankcal.job.model import InputFile
 from tankcal.job.model.parts import Course, Deadwood
 from tankcal.job.model.settings import (
     Datum,
+    Equipment,
     Inspection,
     Levels,
     Material,
@@ -58,6 +59,9 @@ class JobAsRead(Saved):
     )
     levels: Levels | None = key(
         "operating levels; left out if none are given", default=None, optional=True
+    )
+    equipment: list[Equipment] | None = key(
+        "used in the survey; left out without a register", default=None, optional=True
     )
 
 
@@ -216,5 +220,11 @@ def _head_values(job):
     return {
         "versions": versions,
         "files": job.files,
-        "job": fill_from(JobAsRead, job, inspection=job.inspection, levels=job.levels),
+        "job": fill_from(
+            JobAsRead,
+            job,
+            inspection=job.inspection,
+            levels=job.levels,
+            equipment=job.equipment or None,
+        ),
     }

@@ -123,7 +123,8 @@ def calibration(paper):
 
 
 def _instruments(paper):
-    """Return a text of the instruments with their certificates; "" without instruments."""
+    """Return a text of the instruments that the table of equipment does not contain."""
+    listed = {item["name"] for item in paper.record["job"].get("equipment") or ()}
     return "; ".join(
         paper.word(
             "certificate.instrument",
@@ -131,6 +132,7 @@ def _instruments(paper):
             certificate=certificate or paper.word("certificate.no_certificate"),
         )
         for name, certificate in instruments_of(paper.record).items()
+        if name not in listed
     )
 
 

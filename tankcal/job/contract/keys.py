@@ -173,6 +173,16 @@ SURVEY = (
         MOST_BAR,
         kinds=SPHERE,
     ),
+    _text(
+        "equipment_register",
+        "file of the laboratory's equipment, such as ../equipment.toml; blank: equipment.toml of"
+        " the job, if it exists",
+    ),
+    Field(
+        "equipment_used",
+        "names",
+        "equipment of the register that was used in this survey; blank: all of it",
+    ),
 )
 DATUM = (
     number(

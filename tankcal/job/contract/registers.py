@@ -285,6 +285,20 @@ def _override(name, note):
     return Field(name, "choice", note, choices=SCOPES_AND_STATES, of_survey=True)
 
 
+EQUIPMENT = (  # keys of equipment.toml; no value enters a calculation
+    Field(
+        "description",
+        "text",
+        "kind of equipment with make and model, such as: total station, Leica TS16",
+        required=True,
+    ),
+    Field("serial_number", "text", "number of the manufacturer or of the laboratory"),
+    Field("laboratory", "text", "laboratory that calibrated it, with its accreditation"),
+    Field("certificate", "text", "number of its calibration certificate"),
+    Field("date", "date", "date of its calibration, year-month-day"),
+    Field("due", "date", "last day on which this calibration may be used, year-month-day"),
+    Field("uncertainty", "text", "uncertainty of the certificate, such as: 0.03 mm/m, k = 2"),
+)
 CAMERA_SETTINGS = (
     _override(
         "default", "scope and state of c x0 y0 K1 K2 K3 P1 P2 and the affinity; blank: camera free"
@@ -300,10 +314,12 @@ SHORT_KEYS = {
     "instruments": {},
     "clouds": {},
     "meters": {},
+    "equipment": {},
 }
 REGISTER_KEYS = {
     "cameras": CAMERA,
     "instruments": (*INSTRUMENT, *TAPE, *PLUMMET, *RANGING, *BAR),
+    "equipment": EQUIPMENT,
 }
 REGISTERS_OF_SURVEY = {
     "photos": ("cameras", "instruments"),

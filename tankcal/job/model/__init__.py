@@ -20,6 +20,7 @@ from tankcal.job.model.parts import (
 from tankcal.job.model.settings import (
     Datum,
     DeclaredInput,
+    Equipment,
     Inspection,
     Levels,
     Material,
@@ -149,6 +150,8 @@ class Job:
         attribute of its own, such as "great_circles".
     overrulings : tuple of Overruling
         Manual decisions against the search for blunders, in the order of the file.
+    equipment : tuple of Equipment
+        Equipment used in the survey, with its calibrations.
     """
 
     tank: Tank | None
@@ -195,3 +198,4 @@ class Job:
     surveys: dict = field(default_factory=dict)
     top: Top | None = None
     overrulings: tuple[Overruling, ...] = ()
+    equipment: tuple[Equipment, ...] = ()

@@ -253,3 +253,25 @@ class Material:
     expansion_per_k: float = 1.1e-5
     expansion_given: bool = False
     poisson: float | None = field(default=None, metadata={"optional": True})
+
+
+@dataclass(frozen=True)
+class Equipment:
+    """Measuring equipment of a survey with its calibration (equipment.toml); "": not given.
+
+    Attributes
+    ----------
+    date, due : str
+        Day of its calibration, and the last day on which this calibration may be used.
+    uncertainty : str
+        Uncertainty as stated by its certificate.
+    """
+
+    name: str
+    description: str
+    serial_number: str = ""
+    laboratory: str = ""
+    certificate: str = ""
+    date: str = ""
+    due: str = ""
+    uncertainty: str = ""

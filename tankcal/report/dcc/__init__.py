@@ -101,9 +101,15 @@ def add_results(parent, languages, digest):
     add_text(element, "name", languages.word("titles.certificate"))
     _methods(add_child(element, "usedMethods"), languages)
     _software(add_child(element, "usedSoftware"), languages.record)
+    listed = languages.job.get("equipment") or ()
     used = instruments_of(languages.record)
+    # An instrument of the register is stated once, with the certificate of the register.
+    used = {name: (name, used[name], None) for name in used} | {
+        item["name"]: (f"{item['name']}: {item['description']}", item["certificate"],
+                       item["serial_number"]) for item in listed
+    }  # fmt: skip
     if used:
-        _equipment(add_child(element, "measuringEquipments"), languages, used)
+        _equipment(add_child(element, "measuringEquipments"), languages, used.values())
     _conditions(add_child(element, "influenceConditions"), languages)
     _results(add_child(element, "results"), languages)
     _meta_data(add_child(element, "measurementMetaData"), languages, digest)
@@ -132,13 +138,21 @@ def _software(parent, record):
 
 
 def _equipment(parent, languages, used):
-    for name, certificate in used.items():
+    """Add each instrument: (name, number of its certificate, its serial number)."""
+    certificate_names = languages.word("dcc.certificate_of_instrument")
+    serial_names = languages.label("serial_number")
+    for name, certificate, serial_number in used:
         element = add_child(parent, "measuringEquipment", refType="tankcal_instrument")
         add_text(element, "name", name)
+        if not (clean(certificate) or clean(serial_number)):
+            continue
+        identified = add_child(element, "identifications")
         if clean(certificate):
-            identified = add_child(element, "identifications")
-            names = languages.word("dcc.certificate_of_instrument")
-            add_identification(identified, clean(certificate), names, "tankcal_certificate")
+            add_identification(
+                identified, clean(certificate), certificate_names, "tankcal_certificate"
+            )
+        if clean(serial_number):
+            add_identification(identified, clean(serial_number), serial_names, "tankcal_serial")
 
 
 def _conditions(parent, languages):

@@ -178,6 +178,27 @@ CORRECTIONS = Table(
     rows=lambda record: record["corrections"],
 )  # fmt: skip
 
+
+def _description(paper, row):
+    """Return the description of a piece of equipment with its serial number."""
+    if not row["serial_number"]:
+        return row["description"]
+    return f"{row['description']}, {paper.label('serial_number')} {row['serial_number']}"
+
+
+EQUIPMENT = Table(
+    "equipment",
+    (
+        Column("name", heading="item", sheet="item", width=20),
+        Column("description", text=_description, sheet="description", width=50),
+        Column("laboratory", sheet="laboratory", width=34),
+        Column("certificate", sheet="certificate", width=16),
+        Column("date", heading="calibrated", sheet="calibrated", width=12),
+        Column("due", sheet="due", width=12),
+        Column("uncertainty", sheet="uncertainty", width=30),
+    ),
+    rows=lambda record: record["job"].get("equipment") or [],
+)
 DEADWOOD = Table(
     "deadwood",
     (

@@ -100,6 +100,8 @@ def provenance_sheet(book, record):
         ("files", "input_files", tank.FILES),
         ("programs", "programs", tank.PROGRAMS),
     )
+    if record["job"].get("equipment"):
+        declared += (("equipment", "equipment", tank.EQUIPMENT),)
     sections = [
         cell_table(book, table, name=name, title=book.word(f"headings.{title}"))
         for title, name, table in declared
