@@ -4,6 +4,8 @@ The certificate prints only statements of the job. A missing statement becomes a
 listed as missing.
 """
 
+from math import hypot
+
 from tankcal.job.plausibility_table import CODES
 from tankcal.methods.base import methods
 from tankcal.report import blocks
@@ -15,12 +17,10 @@ from tankcal.report.tables.facts import (
     tank_facts,
 )
 from tankcal.report.uncertainty.method import missing_inputs
-from tankcal.report.uncertainty.stated import stated_U_m3
-from tankcal.text.digits import decimals_of
 
 TO_WRITE_ON = ""  # value that the page style prints as a blank line
 # Entries of [certificate] that other parts of the paper print.
-_ELSEWHERE = ("number", "notice", "authorised_by", "authorised_role")
+_ELSEWHERE = ("number", "notice", "survey_end", "authorised_by", "authorised_role")
 _PARTIES = (
     *("laboratory", "laboratory_address", "country", "accreditation_number"),
     *("customer", "customer_address", "customer_contact", "place", "date_of_issue", "replaces"),
@@ -64,20 +64,37 @@ def limits_of_u(paper):
     texts = [paper.word("certificate.not_in_u")]
     if missing := missing_inputs(paper):
         texts.append(paper.word("certificate.undeclared", missing="; ".join(missing)))
-    U = stated_U_m3(paper.record["capacity"])[-1]
     effects = [
         paper.word(
             "certificate.effect",
-            name=paper.word(f"corrections.{row['code']}"),
-            sign="+" if row["size_m3"] > 0 else "",
-            size=paper.number(row["size_m3"], "m3", decimals=decimals_of(U) + 1),
+            name=name,
+            sign="+" if size_m3 > 0 else "",
+            size=paper.number(size_m3, "m3", digits=3),
         )
-        for row in paper.record["corrections"]
-        if not row["applied"] and row["size_m3"]
+        for name, size_m3 in _effects_without_correction(paper)
     ]
     if effects:
         texts.append(paper.word("certificate.not_corrected", effects="; ".join(effects)))
     return " ".join(texts)
+
+
+def _effects_without_correction(paper):
+    """Return name and size, m3, of each known effect that the table does not correct (list)."""
+    record = paper.record
+    effects = [
+        (paper.word(f"corrections.{row['code']}"), row["size_m3"])
+        for row in record["corrections"]
+        if not row["applied"] and row["size_m3"]
+    ]
+    tilts = {choice["value"] for choice in record["choices"] if choice["code"] == "tilt"}
+    lines = record.get("lines") or {}
+    if "not_applied" in tilts and lines.get("lean_x") is not None:
+        slope = hypot(lines["lean_x"], lines["lean_y"])
+        # A horizontal cut of a shell of slope m is sqrt(1 + m^2) times the cut square to its axis.
+        size_m3 = record["capacity"]["volume_m3"][-1] * (hypot(1.0, slope) - 1)
+        shown = paper.number(slope, "mm/m", digits=3)
+        effects.append((f"{paper.word('corrections.tilt')} ({shown})", size_m3))
+    return effects
 
 
 def doubtful_input(paper):
@@ -153,7 +170,8 @@ def statements(paper):
     certificate = paper.record["job"]["certificate"]
     missing = [paper.label(key) for key in _ASKED_FOR if not certificate.get(key)]
     rule = (paper.record.get("rule") or {}).get("rule", {})
-    sentences = [paper.word("certificate.only_items"), paper.word("texts.copy")]
+    words = ("certificate.only_items", "texts.copy", "certificate.digits")
+    sentences = [paper.word(word) for word in words]
     sentences += rule.get("statements", [])
     if missing:
         sentences.append(paper.word("certificate.not_given", missing=", ".join(missing)))
@@ -176,7 +194,8 @@ def hash_of_record(paper):
     digest = paper.digest
     if digest is None:
         return None
-    return blocks.hash_code(digest, paper.word("dcc.hash_of"), paper.words["dcc"]["code_alt"])
+    text = paper.word("dcc.hash_of", software=f"tankcal {paper.record['tankcal']}")
+    return blocks.hash_code(digest, text, paper.words["dcc"]["code_alt"])
 
 
 def _facts(paper, given, keys, to_write_on):

@@ -57,6 +57,7 @@ SETTINGS_OF_VERTICAL = [
     ),
     ({"corrections.plate": "off"}, "corrections.plate", "true or false"),
     ({"certificate.date_of_issue": "2024-05-30"}, "certificate.date_of_issue", "before the survey"),
+    ({"certificate.survey_end": "2024-05-30"}, "certificate.survey_end", "before the first day"),
     ({"corrections.plates": True}, "corrections.plates", "did you mean plate?"),
     ({"survey.liquid_level_m": 3.0}, "survey.liquid_density_kg_m3", "the density of the liquid"),
     (

@@ -5,11 +5,13 @@ import shutil
 
 import pytest
 from example_certificates import EXAMPLES, certificate_blocks, record_of_example
+from paper_cells import texts
 
 import tankcal
 from tankcal.job.rule_files import shipped_rule
 from tankcal.record import load, record_of, save
 from tankcal.report import certificate
+from tankcal.report.dcc import certificate_xml
 from tankcal.report.paper import Paper
 from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import load_words
@@ -44,7 +46,7 @@ def test_every_undeclared_input_is_named_there():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("size", "shown"), [(0.4312, "+0.431"), (-2.7718, "−2.772")])
+@pytest.mark.parametrize(("size", "shown"), [(0.4312, "+0.431"), (-2.7718, "−2.77")])
 def test_an_effect_that_is_not_corrected_has_its_sign(size, shown):
     record = record_of_example("strapping")
     sound = certificate.limits_of_u(Paper(record, language="en"))
@@ -79,3 +81,35 @@ def test_statements_of_the_rule_are_printed_as_they_are(language, tmp_path):
     earlier = json.loads(json.dumps(saved))
     shown = certificate.statements(Paper(earlier, language=language)).data["items"]
     assert not set(shipped_rule("france_2003").statements) & set(shown)
+
+
+@pytest.mark.slow
+def test_a_tilt_that_is_not_applied_has_its_size():
+    """The horizontal cut of a cylinder of slope m has the area A sqrt(1 + m^2)."""
+    record = record_of_example("reference-line")
+    lines, top_m3 = record["lines"], record["capacity"]["volume_m3"][-1]
+    lines |= {"lean_x": 0.003, "lean_y": 0.004}
+    text = certificate.limits_of_u(Paper(record, language="en"))
+    assert f"({shown(5.0, 2)}\N{NO-BREAK SPACE}mm/m), +{shown(top_m3 * 12.5e-6, 4)}" in text
+
+
+def shown(value, decimals):
+    return f"{value:.{decimals}f}"
+
+
+@pytest.mark.slow
+def test_first_and_last_day_digits_and_software_are_stated():
+    record = record_of_example("strapping")
+    dated = record["job"]["certificate"] | {"survey_end": "2026-05-06"}
+    record = record | {"job": record["job"] | {"certificate": dated}}
+    paper = Paper(record, language="en")
+    facts = dict(certificate.calibration(paper).data["items"])
+    assert facts["Date of survey"] == "4 May 2026"
+    assert facts["Last day of the survey"] == "6 May 2026"
+    assert "Survey end" not in dict(certificate.parties(paper).data["items"])
+    xml = certificate_xml(record, "0" * 64).decode()
+    assert "<dcc:endPerformanceDate>2026-05-06</dcc:endPerformanceDate>" in xml
+    shown_blocks = certificate_blocks("strapping", "en")
+    (code,) = (block for block in shown_blocks if block["kind"] == "hash_code")
+    assert f"tankcal {record['tankcal']}" in code["text"]
+    (_,) = (text for text in texts(shown_blocks) if "more digits than U" in text)

@@ -49,7 +49,7 @@ def test_entries_without_a_line_are_named_as_missing(paper):
     said = certificate.statements(paper(method="ISO 7507-3")).data["items"]
     assert said[-1].endswith("7.8.4): Traceability, Conditions, Condition of the tank.")
     given = dict.fromkeys(("method", "traceability", "conditions", "condition_of_tank"), "x")
-    assert len(certificate.statements(paper(**given)).data["items"]) == 2
+    assert len(certificate.statements(paper(**given)).data["items"]) == 3
 
 
 @pytest.mark.slow
@@ -64,13 +64,13 @@ def test_every_field_of_the_contract_is_printed(example_record, tmp_path):
     """A key that a job may give stands somewhere on the certificate."""
     record = json.loads(example_record.read_text(encoding="utf-8"))
     given = {field.name: f"value of {field.name}" for field in KEYS["certificate"]}
-    given["date_of_issue"] = "2024-11-21"
+    given |= {"date_of_issue": "2024-11-21", "survey_end": "2024-11-21"}
     record["job"]["certificate"] = given | {"permit": "OS 7"}
     path = tmp_path / "record.json"
     path.write_text(json.dumps(record), encoding="utf-8")
     printed = "\n".join(texts(paper_blocks(path)))
     for name, value in given.items():
-        shown = "21 November 2024" if name == "date_of_issue" else value
+        shown = "21 November 2024" if name in ("date_of_issue", "survey_end") else value
         assert shown in printed, name
     assert "OS 7" in printed
     assert "value of authorised_by, value of authorised_role" in printed
@@ -145,7 +145,7 @@ def test_user_text_is_printed_literally(short_record, tmp_path):
     """typst, LaTeX, HTML and spreadsheet markup in every text field of the job."""
     record = json.loads(short_record.read_text(encoding="utf-8"))
     short = {"authorised_by": "#a *b* $c$", "authorised_role": "<i>"}  # in a narrow column
-    names = {field.name for field in KEYS["certificate"]} - {"date_of_issue", *short}
+    names = {field.name for field in KEYS["certificate"]} - {"date_of_issue", "survey_end", *short}
     fields = {name: f"{name} {HARD}" for name in sorted(names - {"notice"})}
     record["job"]["certificate"] = fields | short | {"notice": "#N *x*"}
     details = ("owner", "location", "product", "manufacturer", "construction", "remarks")

@@ -188,7 +188,17 @@ def check_settings(values, tables, extent, kind, raw, log):
         tell(log.problem, raw, "table", "other_densities_kg_m3", expected)
     _check_deliveries(table["minimum_delivery_m"] or (), extent, raw, log)
     _check_country(values["certificate"].get("country"), raw, log)
-    issued, surveyed = values["certificate"].get("date_of_issue"), values["survey"]["date"]
+    certificate, surveyed = values["certificate"], values["survey"]["date"]
+    issued, last_day = certificate.get("date_of_issue"), certificate.get("survey_end")
+    if last_day and surveyed and last_day < surveyed:
+        expected = message(
+            "ended_before_survey",
+            "found {last_day}, before the first day {surveyed}; expected no earlier day",
+            last_day=last_day,
+            surveyed=surveyed,
+        )
+        tell(log.problem, raw, "certificate", "survey_end", expected)
+    surveyed = max(filter(None, (surveyed, last_day)), default=None)
     if issued and surveyed and issued < surveyed:
         expected = message(
             "issued_before_survey",

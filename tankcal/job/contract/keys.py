@@ -314,6 +314,7 @@ CERTIFICATE = (
     _text("replaces", "certificate replaced by this certificate, and the reason"),
     _text("authorised_by", "person who authorises the certificate"),
     _text("authorised_role", "function of the person who authorises the certificate"),
+    Field("survey_end", "date", "last day of a survey of several days; [survey] date is the first"),
     Field("date_of_issue", "date", "date of issue, year-month-day"),
     _text("remarks", "remarks to be printed on the certificate"),
     _text("notice", "notice printed on every page, such as RECONSTRUCTION"),

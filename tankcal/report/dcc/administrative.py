@@ -27,7 +27,7 @@ _OTHER_ELEMENTS = (  # keys of the certificate with elements of their own
         "accreditation_number",
     ),
     *("laboratory", "laboratory_address", "customer", "customer_address"),
-    *("authorised_by", "authorised_role", "operator", "notice"),
+    *("authorised_by", "authorised_role", "operator", "notice", "survey_end"),
 )
 _REQUIRED = (  # keys whose absence a statement names
     "country",
@@ -87,7 +87,7 @@ def _core_data(parent, languages, digest):
     names = languages.word("dcc.record")
     add_identification(identified, f"sha256:{digest}", names, "tankcal_record")
     add_child(parent, "beginPerformanceDate", day)
-    add_child(parent, "endPerformanceDate", day)
+    add_child(parent, "endPerformanceDate", str(certificate.get("survey_end") or day))
     add_child(parent, "performanceLocation", "other")
     if certificate.get("date_of_issue"):
         add_child(parent, "issueDate", str(certificate["date_of_issue"]))

@@ -18,6 +18,10 @@ def _day(paper, row):
     return paper.day(row["survey_date"])
 
 
+def _last_day(paper, row):
+    return paper.day(row.get("survey_end"))
+
+
 def _method(paper, row):
     adjustment = paper.record["adjustment"]
     return method_line(paper.words, adjustment) if adjustment else None
@@ -102,11 +106,13 @@ def radii_source_text(paper, row=None):
 def _survey(record):
     survey = record["job"]["survey"]
     radii = record.get("radii")
+    dates = {key: record["job"]["certificate"].get(key) for key in ("survey_end",)}
+    dates["survey_date"] = survey["date"]
     if radii and not radii["change"]:  # no survey: the date is the date of the radii
-        return [{"survey_date": survey["date"]}]
+        return [dates]
     return [
         {
-            "survey_date": survey["date"],
+            **dates,
             "survey_side": survey["side"],
             "shell_temperature": survey["shell_temperature_c"],
             "liquid_level": survey["liquid_level_m"],
@@ -117,7 +123,11 @@ def _survey(record):
 
 
 SURVEY_DATE = Table(
-    "survey_date", (Column("survey_date", text=_day, sheet=True, in_sheet={"text": None}),),
+    "survey_date",
+    (
+        Column("survey_date", text=_day, sheet=True, in_sheet={"text": None}),
+        Column("survey_end", text=_last_day, sheet=True, optional=True),
+    ),
     rows=_survey,
 )  # fmt: skip
 SURVEY = Table(
