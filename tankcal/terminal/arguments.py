@@ -1,6 +1,7 @@
 """Types of command-line arguments: numbers and languages."""
 
 import argparse
+import math
 
 from tankcal.messages import message
 from tankcal.terminal.showing import say_in_language
@@ -38,6 +39,16 @@ def read_letterhead(options):
     from tankcal.report.letterhead import load
 
     return load(options.letterhead)
+
+
+def parse_number(text):
+    """Return a finite number."""
+    value = _number(text)
+    if not math.isfinite(value):
+        raise refuse_argument(
+            message("option_number", "found {text!r}; expected a number", text=text)
+        )
+    return value
 
 
 def parse_positive(text):

@@ -472,6 +472,9 @@ def _make_quantities(folder):
             ticket | {"tickets.csv": TICKETS}, ("ticket.toml", "tickets.csv"), complains=False),
         "ticket document": Base((*command, "--quiet", "--out", "{out}"), ticket,
                                 ("ticket.toml",), complains=False),
+        "standard": Base(
+            ("standard", *command[1:], "--temperatures", "15", "30", "--densities", "840",
+             "--json", "--out", "{out}/standard.csv"), ticket, ("ticket.toml",), complains=False),
         "gauge": Base(("gauge", "{in}", "--json"), gauge, ("gauge.toml", "readings.csv"),
                       complains=False),
         "gauge certificate": Base(("gauge", "{in}", "--quiet", "--out", "{out}"), gauge,

@@ -7,7 +7,10 @@ class Quantity(Product):
     """Quantity of a transfer or of a stock."""
 
     name = "quantity"
-    commands = (("ticket", "tankcal.products.quantity.command"),)
+    commands = (
+        ("ticket", "tankcal.products.quantity.command"),
+        ("standard", "tankcal.products.quantity.standard_command"),
+    )
 
     def documents(self):
         from tankcal.report import ticket
