@@ -123,6 +123,19 @@ def list_cycles(modules):
     return [group for group in groups.values() if len(group) > 1]
 
 
+def list_single_importers(modules):
+    """(lines, module, its only importer) of each module that a single other imports, by lines."""
+    importers = defaultdict(list)
+    for name, module in modules.items():
+        for imported in module.imports:
+            importers[imported].append(name)
+    return sorted(
+        (module.lines, name, importers[name][0])
+        for name, module in modules.items()
+        if len(importers[name]) == 1 and not module.is_package
+    )
+
+
 def share_with_parameters(modules):
     """Percentage of the public functions of the core whose docstrings list the parameters."""
     docs = [
@@ -138,8 +151,6 @@ def share_with_parameters(modules):
 def measure(modules):
     """({measure with a limit: value}, {measure of size or of care: value}) of modules."""
     lines = sum(m.lines for m in modules.values())
-    importers = Counter(name for m in modules.values() for name in m.imports)
-    single = [n for n, m in modules.items() if importers[n] == 1 and not m.is_package]
     commented = [m for m in modules.values() if m.name.split(".")[1] in COMMENTED]
     limited = {
         "modules in import cycles": sum(map(len, list_cycles(modules))),
@@ -157,7 +168,7 @@ def measure(modules):
     free = {
         "modules": len(modules),
         "lines": lines,
-        "modules with a single importer": len(single),
+        "modules with a single importer": len(list_single_importers(modules)),
         f"comments per 1000 lines of {', '.join(COMMENTED)}": round(
             1000 * sum(m.comments for m in commented) / max(sum(m.lines for m in commented), 1)
         ),
@@ -181,6 +192,8 @@ def main(arguments=None):
     if options.list:
         for group in list_cycles(modules):
             print("cycle:", *group)
+        for lines, name, importer in list_single_importers(modules):
+            print(f"single importer: {lines:4d}  {name}  in {importer} ({modules[importer].lines})")
         for name in ("branches", "lines_called_once"):
             for module in sorted(modules.values(), key=lambda m: -getattr(m, name))[:25]:
                 print(f"{name}: {getattr(module, name):4d}  {module.name}")

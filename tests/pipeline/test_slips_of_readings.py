@@ -13,8 +13,11 @@ from test_slips_of_crews import book_of, computed
 import tankcal
 from tankcal.errors import InputError
 from tankcal.job.checks.survey.angle_units import chance_of_packed
-from tankcal.methods.hits.misread import refuse_misread_lines, refuse_other_units
-from tankcal.methods.hits.wall import _refuse_stations_outside
+from tankcal.methods.hits.wall import (
+    _refuse_stations_outside,
+    refuse_misread_lines,
+    refuse_other_units,
+)
 
 IN_METRES = [
     ("strapping", "circumferences", "s_mm"),
