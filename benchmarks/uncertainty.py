@@ -31,8 +31,8 @@ from scipy.linalg import block_diag
 from tankcal.geometry.field.estimate import LEVELS
 from tankcal.job import DeclaredInput
 from tankcal.tank.body import Body, ShellPart
+from tankcal.tank.budgets import survey_factors
 from tankcal.tank.capacity import Capacity
-from tankcal.tank.factors import survey_factors
 from tankcal.tank.fittings import deadwood
 from tankcal.tank.volumes import CourseShape, ShellVolume, gauss_levels
 from tankcal.uncertainty import combine, group_correlated

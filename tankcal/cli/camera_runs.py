@@ -53,7 +53,7 @@ def compare(options):
     """Compare all pairs of calibrations."""
     prepare_for_small_work()
     from tankcal.calibration.stability.comparison import compare as compare_calibrations
-    from tankcal.calibration.stability.grids import parse_grid, parse_terrain
+    from tankcal.calibration.stability.fits import parse_grid, parse_terrain
     from tankcal.job.calibrations import choose, read_cameras, with_pixels
     from tankcal.record.camera_stability import plain_stability, summary
 

@@ -13,7 +13,7 @@ from tankcal.geometry.field.blunders import MOST_ROUNDS, restricted_precision, s
 from tankcal.geometry.field.sites import Sites, free_design, spans_of
 from tankcal.methods.base import completing_method
 from tankcal.survey.reference_line import level_names
-from tankcal.tank.factors import Factor
+from tankcal.tank.budgets import Factor
 
 FORMER, FORMER_SD_M = "former_radius", 0.01  # courses not measured again: kind, and sd
 UNCONTROLLED = 1e-6  # least share of a reading's variance that other readings control

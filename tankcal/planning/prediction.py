@@ -15,11 +15,11 @@ from tankcal.pipeline.table import check_table
 from tankcal.planning.contract import PLAN_FILE
 from tankcal.planning.measurements import measurements_of, nominal_of
 from tankcal.planning.model import Plan
-from tankcal.planning.reliability import assess_reliability
 from tankcal.planning.table import (
     PredictedCovariance,
     PredictedTable,
     TableResults,
+    assess_reliability,
     predict_table,
     refuse_without_delivery,
 )

@@ -29,13 +29,13 @@ from tankcal.pipeline.wall.point_covariance import s_transform
 from tankcal.planning.measurements import draw_blunders, draw_measurements
 from tankcal.planning.prediction import Prediction
 from tankcal.planning.wall.nominal_readings import (
+    DrawnWall,
     Errors,
     add_network_errors,
     levels_of_readings,
     set_readings,
 )
 from tankcal.planning.wall.prediction import WallPrediction
-from tankcal.planning.wall.tank_walls import DrawnWall
 from tankcal.survey import adjust_survey, wall_points
 from tankcal.uncertainty import combine
 

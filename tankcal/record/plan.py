@@ -7,7 +7,7 @@ import numpy as np
 from tankcal.methods.base import count_readings
 from tankcal.planning.places import group_by_ends
 from tankcal.planning.prediction import PointOutlook, SectionOutlook
-from tankcal.planning.reliability import GroupReliability
+from tankcal.planning.table import GroupReliability
 from tankcal.planning.wall.changes import wall_count
 from tankcal.planning.wall.filling import FillingOutlook
 from tankcal.planning.wall.prediction import CourseOutlook, ReadingsOutlook

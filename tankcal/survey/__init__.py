@@ -15,7 +15,7 @@ _ROOM_OF = {
     "adjust_survey": "adjustment",
     "datum_dependence": "results",
     "predict_survey": "prediction",
-    "wall_points": "wall",
+    "wall_points": "points",
 }
 
 __all__ = [*_ROOM_OF]

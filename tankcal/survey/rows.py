@@ -3,8 +3,7 @@
 import numpy as np
 
 from tankcal.camera.model import PARAMETERS, UNITS
-from tankcal.survey.network.reactions import HELD
-from tankcal.survey.network.reliability import UNCONTROLLED
+from tankcal.survey.network.reliability import HELD, UNCONTROLLED
 from tankcal.survey.observations import NUISANCES
 from tankcal.survey.results import GroupOfReadings, Reading, Readings
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tankcal.tank.factors import Factor, join_shared
+from tankcal.tank.budgets import Factor, join_shared
 from tankcal.tank.parts import Part, sum_derivatives
-from tankcal.tank.surveyed_form import SurveyedForm
+from tankcal.tank.solids import SurveyedForm
 from tankcal.tank.volumes import ShellVolume
 from tankcal.uncertainty import declared_source, group_correlated
 

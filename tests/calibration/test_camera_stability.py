@@ -13,21 +13,19 @@ from survey_builder import survey_parts
 
 from tankcal.calibration.stability.comparison import METHODS, compare
 from tankcal.calibration.stability.fits import (
-    find_nearest_rotation,
-    fit_resection,
-    fit_rotation,
-    ideal_derivatives,
-    make_orientation_model,
-    rays,
-)
-from tankcal.calibration.stability.grids import (
     DRAWN,
     TERRAINS,
     Grid,
     Terrain,
     default_grid,
+    find_nearest_rotation,
+    fit_resection,
+    fit_rotation,
+    ideal_derivatives,
+    make_orientation_model,
     parse_grid,
     parse_terrain,
+    rays,
 )
 from tankcal.camera.model import (
     AFFINITIES,

@@ -11,7 +11,7 @@ from tankcal.geometry.field.components import COMPONENTS, weld_columns
 from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.sites import Sites
 from tankcal.geometry.girth import SHORTEST_WAVE_M, draw_waves, modes_of, nodes_of
-from tankcal.planning.wall.tank_walls import draw_departures
+from tankcal.planning.wall.nominal_readings import draw_departures
 
 NOMINAL_M, ZETA = 2.0, np.array([-0.6, 0.0, 0.6])
 STEPS = (0, 1, 5, 40, 150)

@@ -39,7 +39,7 @@ class CalipersMethod(Method):
     def solid_part(self, survey, plate_m, scale):
         import numpy as np
 
-        from tankcal.tank.factors import Factor
+        from tankcal.tank.budgets import Factor
         from tankcal.tank.solids import Sphere
 
         factor = Factor("calipers", np.array([[survey.sd_m]]))

@@ -30,7 +30,7 @@ from tankcal.survey.registration import register
 from tankcal.survey.scans import ScanSetup
 from tankcal.survey.wall_hits import RangingInstrument
 from tankcal.tank.bottoms import surveyed_bottom
-from tankcal.tank.factors import cause_factors
+from tankcal.tank.budgets import cause_factors
 from tankcal.tank.terrain import Footprint
 
 R, DEPTH_M, POST = 4.0, 0.2, (1.2, 0.9, 0.15)

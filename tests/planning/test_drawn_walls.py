@@ -12,12 +12,14 @@ from wall_plan_folders import HITS, LINES, TANGENTS
 from tankcal.planning import load_plan
 from tankcal.planning.wall.nominal_readings import (
     EXACT,
+    DrawnWall,
     Errors,
+    RoundWall,
     add_network_errors,
     levels_of_readings,
+    plates_of,
     set_readings,
 )
-from tankcal.planning.wall.tank_walls import DrawnWall, RoundWall, plates_of
 from tankcal.survey.sighting import rays
 from tankcal.survey.strapping import reduce_straps
 

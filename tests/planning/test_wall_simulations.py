@@ -17,8 +17,12 @@ from wall_plan_folders import HITS, LINES, TANGENTS, plan_of
 from tankcal.cli import main
 from tankcal.planning import load_plan, predict
 from tankcal.planning.simulations import combine_survey, compare_survey, simulate_walls
-from tankcal.planning.wall.nominal_readings import Errors, add_network_errors, set_readings
-from tankcal.planning.wall.tank_walls import plates_of
+from tankcal.planning.wall.nominal_readings import (
+    Errors,
+    add_network_errors,
+    plates_of,
+    set_readings,
+)
 
 STRAPS_ALONE = (
     ('courses = ["1"]\nat_percent = [20]\nreadings = 3\n', ""),

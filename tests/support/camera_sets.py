@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tankcal.calibration.stability.grids import Grid
+from tankcal.calibration.stability.fits import Grid
 from tankcal.camera.model import Form
 from tankcal.survey.measurements import CameraSetup
 from tankcal.survey.network.survey import Camera

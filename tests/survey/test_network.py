@@ -11,7 +11,6 @@ from networks import INTERIOR, SCOPE, by_total_station, photographed
 import tankcal.camera.imaging
 import tankcal.solver.compiled
 import tankcal.solver.elimination
-import tankcal.solver.rows
 import tankcal.survey.network.assembly
 from tankcal.adjust import noncentrality
 from tankcal.camera.model import CONVENTIONS, Form
@@ -154,7 +153,7 @@ def test_rows_count_that_say_something_at_the_minimum(start_m):
 
 def test_rows_in_parts_give_what_all_of_them_give(survey, adjusted, monkeypatch):
     """Second method: the derivatives of a group at once; here a dozen image points at a time."""
-    for room in (tankcal.solver.rows, tankcal.survey.network.assembly):
+    for room in (tankcal.solver.elimination, tankcal.survey.network.assembly):
         monkeypatch.setattr(room, "PART", 12)
     found = adjust(survey)
     parts = [part.jac for part in found.solution.cofactor.rows.parts if len(part.w) == 12]

@@ -8,7 +8,7 @@ from networks import photographed
 
 from tankcal.adjust import noncentrality
 from tankcal.survey.network import Survey, adjust
-from tankcal.survey.network.reactions import reactions
+from tankcal.survey.network.reliability import reactions
 from tankcal.survey.observations import ControlCoordinates, Distances, HeightDifferences
 
 HELD = np.array([1, 7, 13, 19, 25, 31, 37, 43])

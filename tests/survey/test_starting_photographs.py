@@ -15,9 +15,8 @@ from tankcal.geometry.rotations import apply_small_rotation, rotation_of_angles,
 from tankcal.survey.network import Camera, Photos, Survey, adjust
 from tankcal.survey.observations import ImageCoordinates, State
 from tankcal.survey.start.approximation import approximate
-from tankcal.survey.start.photographs import Wall
+from tankcal.survey.start.photographs import Wall, bearings
 from tankcal.survey.start.relative import essential_matrices, relative_poses
-from tankcal.survey.start.resection import bearings
 
 IDEAL = np.where(np.arange(13) < 1, 100.0, 0.0)
 

@@ -16,8 +16,8 @@ from tankcal.survey.means import average_readings
 from tankcal.survey.measurements import AdjustmentSettings, Instrument, Measurements, Targets
 from tankcal.survey.network import adjust
 from tankcal.survey.observations import ImageCoordinates
+from tankcal.survey.points import move_to_wall
 from tankcal.survey.readings import EARTH_RADIUS_M, true_distance_m
-from tankcal.survey.wall import move_to_wall
 
 
 @pytest.fixture(scope="module")
@@ -357,7 +357,7 @@ def test_points_of_the_wall(photos, adjustment):
 
 
 def test_too_many_points_of_the_wall_are_refused(photos, adjustment, monkeypatch):
-    monkeypatch.setattr("tankcal.survey.wall.LARGEST", 20)
+    monkeypatch.setattr("tankcal.survey.points.LARGEST", 20)
     with pytest.raises(SolutionError, match="48 points of the wall were adjusted; at most 20 can"):
         wall_points(adjustment, photos[0], "outside")
 

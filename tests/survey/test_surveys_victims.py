@@ -15,7 +15,7 @@ from tankcal.survey import adjust_survey
 from tankcal.survey.means import average_readings, contradictory_labels
 from tankcal.survey.measurements import Measurements
 from tankcal.survey.network import adjust
-from tankcal.survey.network.reactions import HELD, reactions
+from tankcal.survey.network.reliability import HELD, reactions
 from tankcal.survey.network.separability import alternatives
 from tankcal.survey.network.snooping import set_use
 

@@ -8,7 +8,7 @@ from jacobians import assert_derivative
 from shapes import course_of
 
 from tankcal.tank.body import Body, ShellPart, SolidPart
-from tankcal.tank.factors import Factor
+from tankcal.tank.budgets import Factor
 from tankcal.tank.parts import Part
 from tankcal.tank.solids import Sphere
 from tankcal.tank.volumes import ShellVolume

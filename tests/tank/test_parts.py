@@ -13,7 +13,7 @@ from tankcal.pipeline.tanks.vertical import widen_bottom
 from tankcal.quadrature import panels
 from tankcal.tank.body import ShellPart, SolidPart
 from tankcal.tank.bottoms import leaning_bottom, shaped_bottom, surveyed_bottom
-from tankcal.tank.factors import Factor
+from tankcal.tank.budgets import Factor
 from tankcal.tank.fittings import deadwood, floating_roof
 from tankcal.tank.heads import End
 from tankcal.tank.hydrostatics import liquid_head

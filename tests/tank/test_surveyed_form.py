@@ -5,9 +5,8 @@ import pytest
 from jacobians import assert_derivative
 
 from tankcal.tank.body import SolidPart
-from tankcal.tank.factors import Factor
-from tankcal.tank.solids import End, LyingTank, Sphere
-from tankcal.tank.surveyed_form import NODES, SurveyedForm, node_levels
+from tankcal.tank.budgets import Factor
+from tankcal.tank.solids import NODES, End, LyingTank, Sphere, SurveyedForm, node_levels
 
 LYING = LyingTank(2.4, 2.4, 8.0, End("flat"), End("ellipsoidal", 0.5), 0.004, 0.0, 3.0)
 SOLIDS = (LYING, LyingTank(2.4, 2.4, 8.0), Sphere(6.0))

@@ -11,7 +11,7 @@ from shapes import course_of
 from tankcal.errors import HeightError, SolutionError
 from tankcal.tank.body import ShellPart
 from tankcal.tank.bottoms import shaped_bottom
-from tankcal.tank.factors import Factor
+from tankcal.tank.budgets import Factor
 from tankcal.tank.heads import End, standard_end
 from tankcal.tank.hydrostatics import liquid_head
 from tankcal.tank.meshes.part import Mesh, mesh_part

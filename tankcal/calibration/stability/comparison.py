@@ -28,13 +28,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tankcal.calibration.stability.fits import (
+    SEED,
+    TERRAINS,
+    Grid,
+    Terrain,
     camera_covariance,
     compute_expected_px,
+    default_grid,
     fit_resection,
     fit_rotation,
     ideal_derivatives,
 )
-from tankcal.calibration.stability.grids import SEED, TERRAINS, Grid, Terrain, default_grid
 from tankcal.camera.model import correct_image_points, distort_image_points
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.geometry.rotations import angles_of

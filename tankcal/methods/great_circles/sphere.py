@@ -30,9 +30,9 @@ from tankcal.pipeline.wall_readings import (
 )
 from tankcal.pipeline.wall_straps import AreaTerm
 from tankcal.survey.strapping import ReducedStrap, reduce_straps, tapes_used
+from tankcal.tank.budgets import Factor
 from tankcal.tank.ellipsoids import Ellipsoid
-from tankcal.tank.factors import Factor
-from tankcal.tank.surveyed_form import SurveyedForm, node_levels
+from tankcal.tank.solids import SurveyedForm, node_levels
 from tankcal.uncertainty import factor_of
 from tankcal.units import FULL_TURN
 

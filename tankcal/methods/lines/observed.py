@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from tankcal.planning.wall.design_tables import OFF_WALL_M
-from tankcal.planning.wall.tank_walls import plates_of
+from tankcal.planning.wall.nominal_readings import plates_of
 
 
 def observe_offsets(job, wall, errors):

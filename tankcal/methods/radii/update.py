@@ -29,7 +29,7 @@ from tankcal.methods.radii.wall import COMMON, causes_of, wall_of_radii
 from tankcal.methods.strapping.wall import StrappedWall
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall_straps import told_courses
-from tankcal.tank.factors import Factor
+from tankcal.tank.budgets import Factor
 
 CHANGE_OWN, CHANGE_COMMON, SHARED = "radii_change", "radii_change_common", "course_radii_shared"
 FORM = "measured_form"  # form of the measured courses between their readings

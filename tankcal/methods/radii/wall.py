@@ -18,7 +18,7 @@ from tankcal.messages import message
 from tankcal.pipeline.tanks import shell_zero
 from tankcal.pipeline.taped_wall import UprightAxis
 from tankcal.pipeline.wall.finding import joints_of
-from tankcal.tank.factors import Factor
+from tankcal.tank.budgets import Factor
 from tankcal.uncertainty import factor_of
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ from tankcal.pipeline.wall_straps import AreaTerm, gauged_plates
 from tankcal.quadrature import panels
 from tankcal.survey.strapping import reduce_straps, tapes_used
 from tankcal.tank.body import SolidPart
-from tankcal.tank.factors import Factor
+from tankcal.tank.budgets import Factor
 from tankcal.tank.lying import WAVES, RingedTank
 
 # Radius of the measured shell, m. Bulges and drawn-in joints of rings scale with the square root of

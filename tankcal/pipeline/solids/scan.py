@@ -15,8 +15,8 @@ from tankcal.pipeline.checks.survey import origin_of
 from tankcal.pipeline.overruling.points import decisions_of, refuse_kept
 from tankcal.pipeline.solids.scanned_wall import Fitted, agreeing, offsets, scanned_wall
 from tankcal.sections import covariance_of
-from tankcal.tank.factors import Factor
-from tankcal.tank.surveyed_form import SurveyedForm
+from tankcal.tank.budgets import Factor
+from tankcal.tank.solids import SurveyedForm
 
 FAR = 5.0  # standard deviations from the wall above which a point is rejected
 MOST_ROUNDS = 30

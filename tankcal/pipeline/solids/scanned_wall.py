@@ -35,8 +35,8 @@ from tankcal.pipeline.checks.survey import noise_is_estimated
 from tankcal.pipeline.tanks.common import factor_of_unseen
 from tankcal.pipeline.tanks.solid import solid_as_surveyed
 from tankcal.sections import coordinates_of
-from tankcal.tank.factors import Factor, survey_factors
-from tankcal.tank.surveyed_form import NODES, SurveyedForm, node_levels
+from tankcal.tank.budgets import Factor, survey_factors
+from tankcal.tank.solids import NODES, SurveyedForm, node_levels
 from tankcal.units import FULL_TURN
 
 KINDS = ("bulge", "ovality", "oblateness", "seams")

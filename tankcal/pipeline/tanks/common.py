@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from tankcal.methods.base import method_of
-from tankcal.tank.factors import Factor
+from tankcal.tank.budgets import Factor
 from tankcal.tank.fittings import deadwood
 from tankcal.tank.heads import End, standard_end
 from tankcal.uncertainty import factor_of

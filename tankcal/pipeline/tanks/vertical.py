@@ -18,7 +18,7 @@ from tankcal.pipeline.tanks.common import (
     thermal_scale,
 )
 from tankcal.tank.body import Body, ShellPart
-from tankcal.tank.factors import cause_factors
+from tankcal.tank.budgets import cause_factors
 from tankcal.tank.fittings import floating_roof
 from tankcal.tank.heads import End, standard_end
 from tankcal.tank.hydrostatics import liquid_head

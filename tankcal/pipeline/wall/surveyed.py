@@ -20,7 +20,7 @@ from tankcal.pipeline.wall_readings import (
 )
 from tankcal.pipeline.wall_straps import Straps
 from tankcal.sections import Section, coordinates_of
-from tankcal.tank.factors import survey_factors
+from tankcal.tank.budgets import survey_factors
 
 
 @dataclass(frozen=True)

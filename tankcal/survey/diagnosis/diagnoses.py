@@ -11,8 +11,7 @@ import numpy as np
 from tankcal.adjust import CRITICAL
 from tankcal.errors import Problem
 from tankcal.messages import message
-from tankcal.survey.start.photographs import sights_of
-from tankcal.survey.start.resection import resect
+from tankcal.survey.start.photographs import resect, sights_of
 from tankcal.units import FOOT_M
 
 MISPLACED = message("misplaced_point", "a misplaced decimal point")

@@ -12,8 +12,8 @@ from scipy.special import ndtri
 from tankcal.adjust import CRITICAL, noncentrality
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
+from tankcal.survey.diagnosis.blunders import LEVEL, LISTED, count_set_aside
 from tankcal.survey.diagnosis.diagnoses import find_swapped_points
-from tankcal.survey.diagnosis.outlier_attribution import LEVEL, LISTED, count_set_aside
 from tankcal.survey.measurements import Instrument
 from tankcal.survey.network import adjust, snoop
 from tankcal.survey.network.snooping import start_from_adjusted

@@ -8,7 +8,7 @@ import numpy as np
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 from tankcal.solver import Group, Model
-from tankcal.solver.rows import PART
+from tankcal.solver.elimination import PART
 from tankcal.survey.network.blocks import CORRELATED, correlated_groups, is_in_block
 from tankcal.survey.network.survey import FEWEST, IMAGES, SCOPES
 from tankcal.survey.network.unknowns import (

@@ -43,7 +43,7 @@ from tankcal.survey.network.blocks import (
     observations_in_use,
     observations_of,
 )
-from tankcal.survey.network.reactions import HELD
+from tankcal.survey.network.reliability import HELD
 
 # Critical values of T, by the number of values tested.
 LIMITS = (0.0, CRITICAL**2, *(float(chdtri(count, ALPHA)) for count in range(2, 7)))

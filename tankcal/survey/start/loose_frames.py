@@ -17,9 +17,8 @@ from tankcal.geometry.rotations import apply_small_rotation
 from tankcal.messages import message
 from tankcal.survey.observations import HeightDifferences
 from tankcal.survey.start.clues import grow_piece
-from tankcal.survey.start.known import certain_places
 from tankcal.survey.start.photographs import add_points, grow_by_photos
-from tankcal.survey.start.pieces import BAD_JOINT, Motion, joint
+from tankcal.survey.start.pieces import BAD_JOINT, Motion, certain_places, joint
 from tankcal.survey.start.relative import blind_piece
 
 STEPS = 30  # of the alignment from one start

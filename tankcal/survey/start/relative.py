@@ -18,9 +18,15 @@ from scipy.sparse import csr_array
 
 from tankcal.adjust import gauss_newton
 from tankcal.geometry.rotations import apply_small_rotation
-from tankcal.survey.start.photographs import ENOUGH, WORST_ERROR, add_points, grow_by_photos
+from tankcal.survey.start.photographs import (
+    ENOUGH,
+    WORST_ERROR,
+    add_points,
+    bearings,
+    grow_by_photos,
+    resect,
+)
 from tankcal.survey.start.pieces import empty
-from tankcal.survey.start.resection import bearings, resect
 
 FIVES = 150  # samples of five points; nine in ten of them may contain a blunder
 JUDGES = 200  # points used for comparison if there are more
