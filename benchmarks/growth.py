@@ -212,8 +212,7 @@ def cloud(folder, size):
     import clouds
 
     from tankcal.clouds.wall import find_cloud_wall
-    from tankcal.pipeline.clouds.cluster import open_passes
-    from tankcal.pipeline.clouds.passes import Placing, Reading, Telling
+    from tankcal.pipeline.cloud_passes import Placing, Reading, Telling, open_passes
 
     path = folder / "wall.las"
     clouds.write_las(path, size)

@@ -12,7 +12,7 @@ from tankcal.job import Job
 from tankcal.messages import message
 from tankcal.methods.base import supplement_of
 from tankcal.pipeline.checks.survey import incomplete_certificate, open_questions
-from tankcal.pipeline.overruling.effects import effect_of, warn_of_overrulings
+from tankcal.pipeline.overruling_effects import effect_of, warn_of_overrulings
 from tankcal.pipeline.result import Result
 from tankcal.pipeline.simulation import gum_intervals, simulate_table
 from tankcal.pipeline.simulation.table import SIMULATING
@@ -179,7 +179,7 @@ def _collect_warnings(job, adjustment, sighting, survey, tabulation, supplemente
 
 def _base_warnings(job, adjustment):
     """Warnings of the bases measured by stadia."""
-    from tankcal.pipeline.checks.stadia import check_bases, check_rejected_bases
+    from tankcal.pipeline.checks.instruments import check_bases, check_rejected_bases
 
     rejected = check_rejected_bases(job.measurements, adjustment.readings)
     return (*check_bases(job.measurements), *rejected)

@@ -11,7 +11,7 @@ import numpy as np
 from tankcal.errors import HeightError, Problem
 from tankcal.job import Job
 from tankcal.messages import message
-from tankcal.pipeline.overruling.effects import Overrulings
+from tankcal.pipeline.overruling_effects import Overrulings
 from tankcal.pipeline.simulation import Intervals, TableSimulation
 from tankcal.pipeline.statements import Statements, stated_delivery, stated_volume
 from tankcal.pipeline.tanks import shell_volume
@@ -34,10 +34,10 @@ if TYPE_CHECKING:
     from tankcal.methods.clouds.wall import Clouded
     from tankcal.methods.radii.wall import RadiiWall
     from tankcal.methods.strapping.wall import StrappedWall
-    from tankcal.pipeline.liquid.nominal_wall import NominalWall
+    from tankcal.pipeline.liquid.geometry import NominalWall
     from tankcal.pipeline.liquid.result import LiquidResult
     from tankcal.pipeline.read_wall import ReadWall
-    from tankcal.pipeline.solids.scan import Scan
+    from tankcal.pipeline.scanned_solids import Scan
     from tankcal.pipeline.tanks.ship import ShipTables
     from tankcal.pipeline.wall.surveyed import Wall
     from tankcal.pipeline.wall_straps import Straps

@@ -10,8 +10,7 @@ import numpy as np
 from tankcal.geometry.field.sites import MOST_SITES
 from tankcal.messages import message
 from tankcal.methods.base import accompanying_methods, given_methods, method_of
-from tankcal.pipeline.checks.cross_checks import check_mesh, check_scan, check_wall
-from tankcal.pipeline.checks.nominal_size import check_size
+from tankcal.pipeline.checks.size import check_mesh, check_scan, check_size, check_wall
 from tankcal.pipeline.checks.survey import against_nominal, warn_of_undeclared
 from tankcal.pipeline.tanks import body_of, critical_zone, zero_height
 from tankcal.solver.threads import threads_for

@@ -18,11 +18,9 @@ from tankcal.geometry.field.estimate import LEVELS, WallField
 from tankcal.geometry.field.sites import Sites
 from tankcal.geometry.girth import Ring, perimeter_excess, seen_excess
 from tankcal.methods.base import accompanying_methods
-from tankcal.pipeline.read_wall import ReadWall
-from tankcal.pipeline.tanks import insets_of
-from tankcal.pipeline.wall.untied_setups import Unbound
-from tankcal.pipeline.wall_readings import (
+from tankcal.pipeline.read_wall import (
     FORMER,
+    ReadWall,
     columns_of,
     noise_by_inputs,
     noise_of,
@@ -33,6 +31,8 @@ from tankcal.pipeline.wall_readings import (
     settle_readings,
     sites_of,
 )
+from tankcal.pipeline.tanks import insets_of
+from tankcal.pipeline.wall.shared_unknowns import Unbound
 from tankcal.quadrature import panels
 from tankcal.survey.reference_line import courses_with_radius
 from tankcal.survey.strapping import ReducedStrap, reduce_straps, tapes_used

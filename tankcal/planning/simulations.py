@@ -25,7 +25,7 @@ from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.table import compute_table
 from tankcal.pipeline.wall.finding import find_wall
-from tankcal.pipeline.wall.point_covariance import s_transform
+from tankcal.pipeline.wall.surveyed import s_transform
 from tankcal.planning.measurements import draw_blunders, draw_measurements
 from tankcal.planning.prediction import Prediction
 from tankcal.planning.wall.nominal_readings import (

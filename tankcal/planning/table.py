@@ -35,8 +35,7 @@ from tankcal.pipeline.statements import MINIMA_M, statements
 from tankcal.pipeline.table import ComputedTable, compute_table
 from tankcal.pipeline.tanks.vertical import volume_by_points
 from tankcal.pipeline.wall.finding import find_wall
-from tankcal.pipeline.wall.point_covariance import common_motions, s_transform_factors
-from tankcal.pipeline.wall.surveyed import Wall
+from tankcal.pipeline.wall.surveyed import Wall, common_motions, s_transform_factors
 from tankcal.planning.model import TAPED
 from tankcal.planning.places import base_sd_m
 from tankcal.solver.effects import covariances

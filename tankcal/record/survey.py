@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from tankcal.pipeline.checks.homogeneity import homogeneity_of
+from tankcal.pipeline.checks.wall import homogeneity_of
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall_straps import mean_radii
 from tankcal.record.columns import ArrayColumns, ArrayRows, plain_if_short

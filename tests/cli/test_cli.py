@@ -54,7 +54,7 @@ SURVEYS = {  # of kinds that only some jobs have
     *(
         "tankcal.methods.strapping.wall",
         "tankcal.methods.hits.wall",
-        "tankcal.pipeline.solids.scan",
+        "tankcal.pipeline.scanned_solids",
     ),
     *("tankcal.pipeline.liquid", "tankcal.methods.radii.wall", "tankcal.clouds.wall"),
     *("tankcal.tank.meshes", "tankcal.tank.ships", "tankcal.job.excel", "tankcal.job.measuring"),

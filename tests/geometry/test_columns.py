@@ -19,7 +19,7 @@ from tankcal.geometry.patches import find_columns
 from tankcal.geometry.shell import UNDECIDED
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall.finding import find_wall, fit_wall
-from tankcal.pipeline.wall.undecided_columns import factors_of_undecided
+from tankcal.pipeline.wall.surveyed import factors_of_undecided
 from tankcal.tank.capacity import Capacity
 
 TURN_M, NOISE_M = 36.0, 0.001

@@ -14,7 +14,7 @@ import tankcal
 from tankcal.errors import ProgramError
 from tankcal.gum.monte_carlo import Verdict
 from tankcal.job import StatedVolume
-from tankcal.pipeline.simulation.intervals import gum_intervals, judged_intervals
+from tankcal.pipeline.simulation.curvature import gum_intervals, judged_intervals
 from tankcal.record import record_of, save
 from tankcal.record.schema import to_plain
 from tankcal.record.table import budgets_of

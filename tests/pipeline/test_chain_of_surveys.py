@@ -14,7 +14,7 @@ from tankcal.pipeline.chain import adjust_job, run
 from tankcal.pipeline.checks.survey import refuse_undetermined
 from tankcal.pipeline.tanks import body_of, insets_of, shell_volume
 from tankcal.pipeline.wall.finding import find_wall, fit_wall
-from tankcal.pipeline.wall.point_covariance import s_transform
+from tankcal.pipeline.wall.surveyed import s_transform
 from tankcal.sections import coordinates_of
 from tankcal.survey import Cause, wall_points
 from tankcal.survey.measurements import AdjustmentSettings, Instrument, Measurements

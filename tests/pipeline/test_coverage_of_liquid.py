@@ -10,9 +10,8 @@ import pytest
 from metered_runs import fill, metered_job
 
 from tankcal.pipeline.liquid.adjustment import adjust_liquid
-from tankcal.pipeline.liquid.alone import geometry_alone
 from tankcal.pipeline.liquid.body import join_body
-from tankcal.pipeline.liquid.nominal_wall import find_nominal_wall
+from tankcal.pipeline.liquid.geometry import find_nominal_wall, geometry_alone
 from tankcal.tank.solids import LyingTank, Sphere
 from tankcal.uncertainty import combine
 

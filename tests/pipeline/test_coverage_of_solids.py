@@ -19,7 +19,7 @@ from generated_solids import (
 )
 from page_figures import figures_of, ratios_agree, shares_agree
 
-from tankcal.pipeline.solids.scan import fit_scan
+from tankcal.pipeline.scanned_solids import fit_scan
 from tankcal.pipeline.tanks import body_of
 from tankcal.tank.capacity import Capacity
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from generated_solids import LyingShell, job_of
 
-from tankcal.pipeline.checks.cross_checks import check_scan
-from tankcal.pipeline.solids.scan import fit_scan
+from tankcal.pipeline.checks.size import check_scan
+from tankcal.pipeline.scanned_solids import fit_scan
 from tankcal.pipeline.tanks import body_of
 from tankcal.tank.capacity import Capacity
 from tankcal.units import FULL_TURN

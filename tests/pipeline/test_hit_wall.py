@@ -23,8 +23,8 @@ from page_figures import figures_of
 
 import tankcal
 from tankcal.cli.running import describe_rejected
-from tankcal.pipeline.wall.cause_correlations import told_causes
-from tankcal.pipeline.wall.sighted_points import take_points
+from tankcal.pipeline.wall.finding import take_points
+from tankcal.pipeline.wall.shared_unknowns import told_causes
 from tankcal.survey import adjust_survey, wall_points
 from tankcal.survey.sighting import sight
 
@@ -231,7 +231,7 @@ def test_hits_after_the_network_are_named_points_in_it(tmp_path, beside):
     assert len(points.names) == count
     names = hits.job.points.names
     assert names == found.names
-    from tankcal.pipeline.wall.point_covariance import s_transform
+    from tankcal.pipeline.wall.surveyed import s_transform
 
     one, other = s_transform(found), s_transform(points)
     left, right = (p.xyz_m - p.xyz_m.mean(axis=0) for p in (one, other))

@@ -22,8 +22,8 @@ from tankcal.cli.running import _tell
 from tankcal.errors import InputError
 from tankcal.job.contract import COLUMNS, KEYS
 from tankcal.job.plausibility_table import CODES, TABLE
-from tankcal.pipeline.checks import cross_checks as plausibility
-from tankcal.pipeline.solids.scan import fit_scan
+from tankcal.pipeline.checks import size as plausibility
+from tankcal.pipeline.scanned_solids import fit_scan
 from tankcal.record import record_of
 from tankcal.report import certificate
 from tankcal.report.paper import Paper

@@ -20,7 +20,7 @@ from strapped_spheres import sphere_parts
 import tankcal
 from tankcal.errors import InputError, SolutionError
 from tankcal.job.plausibility import unit_guess
-from tankcal.pipeline.checks.nominal_size import departure_of_size
+from tankcal.pipeline.checks.size import departure_of_size
 from tankcal.record import record_of
 from tankcal.report.certificate import doubts_of
 

@@ -24,9 +24,8 @@ from page_figures import figures_of
 import tankcal
 from tankcal.errors import InputError, SolutionError
 from tankcal.geometry.field.sites import free_design
-from tankcal.pipeline.checks.moved_setups import critical_of_setup
-from tankcal.pipeline.checks.tangents import judge_tangents
-from tankcal.pipeline.wall.cause_correlations import noise_of_wall
+from tankcal.pipeline.checks.moved_setups import critical_of_setup, judge_tangents
+from tankcal.pipeline.wall.shared_unknowns import noise_of_wall
 from tankcal.survey.poses import poses_in_network
 
 FOOT, SLOPE, HEIGHT, PLATE = (0.3, -0.2), (0.002, -0.001), 8.0, 0.008

@@ -12,7 +12,7 @@ import tankcal
 from tankcal.geometry.rotations import rotation_of_angles
 from tankcal.pipeline.table import compute_table
 from tankcal.pipeline.wall.finding import find_wall
-from tankcal.pipeline.wall.point_covariance import s_transform
+from tankcal.pipeline.wall.surveyed import s_transform
 from tankcal.planning import load_plan, predict
 from tankcal.planning.measurements import draw_measurements
 from tankcal.planning.table import predict_table, recompute_table

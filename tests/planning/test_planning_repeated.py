@@ -10,7 +10,7 @@ import tankcal.survey.readings
 from tankcal.job import load
 from tankcal.pipeline.table import compute_table
 from tankcal.pipeline.wall.finding import find_wall
-from tankcal.pipeline.wall.point_covariance import s_transform
+from tankcal.pipeline.wall.surveyed import s_transform
 from tankcal.planning import load_plan, predict
 from tankcal.planning.measurements import draw_measurements
 from tankcal.report.planning import empty_job

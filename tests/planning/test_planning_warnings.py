@@ -12,7 +12,7 @@ from plan_folders import changed_plan, with_setups
 import tankcal
 from tankcal.cli import main
 from tankcal.errors import SolutionError
-from tankcal.pipeline.checks.homogeneity import OF_SCATTER
+from tankcal.pipeline.checks.wall import OF_SCATTER
 from tankcal.planning import load_plan, predict
 from tankcal.planning.measurements import draw_measurements
 from tankcal.planning.model import Box

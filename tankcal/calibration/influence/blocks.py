@@ -18,7 +18,7 @@ from tankcal.camera.model import PARAMETERS, UNITS, Form
 from tankcal.geometry.rotations import apply_small_rotation, rotation_vector
 from tankcal.pipeline.chain import run
 from tankcal.pipeline.checks.survey import refuse_undetermined
-from tankcal.pipeline.wall.point_covariance import s_transform
+from tankcal.pipeline.wall.surveyed import s_transform
 from tankcal.survey import wall_points
 from tankcal.survey.network.assembly import assemble
 from tankcal.survey.network.datum import motion_derivatives, null_space

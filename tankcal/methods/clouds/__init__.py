@@ -69,7 +69,7 @@ class CloudsMethod(Method):
 
     def find(self, job, progress, network):
         from tankcal.methods.clouds.wall import find_wall_in_clouds
-        from tankcal.pipeline.clouds.passes import Reading
+        from tankcal.pipeline.cloud_passes import Reading
         from tankcal.pipeline.surveying import Surveyed
 
         reading = Reading(network.cluster, network.part_progress)

@@ -15,13 +15,11 @@ from tankcal.methods.clouds.bottom import CloudInside, find_inside, with_bottom
 from tankcal.methods.clouds.checks import offset_untold
 from tankcal.methods.clouds.overlaps import normals_of, overlaps_of, scans_apart
 from tankcal.methods.clouds.units import is_unit_defined, refusal_of_units
-from tankcal.pipeline.clouds.cluster import open_passes
-from tankcal.pipeline.clouds.passes import Placing, Reading, Telling
-from tankcal.pipeline.solids.scan import fit_scan
-from tankcal.pipeline.wall.cause_correlations import told_causes
-from tankcal.pipeline.wall.finding import find_wall, joints_of
-from tankcal.pipeline.wall.point_covariance import s_transform
-from tankcal.pipeline.wall.sighted_points import through_wall
+from tankcal.pipeline.cloud_passes import Placing, Reading, Telling, open_passes
+from tankcal.pipeline.scanned_solids import fit_scan
+from tankcal.pipeline.wall.finding import find_wall, joints_of, through_wall
+from tankcal.pipeline.wall.shared_unknowns import told_causes
+from tankcal.pipeline.wall.surveyed import s_transform
 from tankcal.survey.beams import BeamPoints, points_of_beams
 from tankcal.survey.registration import Registration, register
 from tankcal.survey.scans import KnownTargets

@@ -20,8 +20,8 @@ from tankcal.geometry.great_ellipses import (
 )
 from tankcal.messages import message
 from tankcal.methods.great_circles.columns import KINDS
-from tankcal.pipeline.checks.nominal_size import single_radius
-from tankcal.pipeline.wall_readings import (
+from tankcal.pipeline.checks.size import single_radius
+from tankcal.pipeline.read_wall import (
     WallReading,
     factors_of_readings,
     inputs_read_with,

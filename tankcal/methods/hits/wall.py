@@ -16,10 +16,9 @@ from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.geometry.circles import taubin_circle
 from tankcal.messages import list_some, message
 from tankcal.methods.hits.checks import offset_unknown
-from tankcal.pipeline.wall.cause_correlations import told_causes
-from tankcal.pipeline.wall.finding import find_wall, joints_of
-from tankcal.pipeline.wall.point_covariance import s_transform
-from tankcal.pipeline.wall.sighted_points import take_points, through_wall
+from tankcal.pipeline.wall.finding import find_wall, joints_of, take_points, through_wall
+from tankcal.pipeline.wall.shared_unknowns import told_causes
+from tankcal.pipeline.wall.surveyed import s_transform
 from tankcal.sections import coordinates_of
 from tankcal.survey import wall_points
 from tankcal.survey.diagnosis.misread_files import OTHER_UNITS

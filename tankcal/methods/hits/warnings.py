@@ -12,22 +12,26 @@ from tankcal.errors import Problem
 from tankcal.geometry.circles import taubin_circle
 from tankcal.geometry.shell import course_of
 from tankcal.messages import list_some, message
-from tankcal.pipeline.checks.levels import (
-    check_nominal,
-    check_size_told,
-    courses_with_few,
-    girth_m,
-    levels_with_few,
+from tankcal.pipeline.checks.instruments import (
+    causes_unlike_certificates,
+    limit_at,
+    limits_of,
+    repeat_factor,
 )
 from tankcal.pipeline.checks.moved_setups import (
     critical_of_ranging,
     moved_or_ranged,
     worst_setup,
 )
-from tankcal.pipeline.checks.ranging import causes_unlike_certificates
-from tankcal.pipeline.checks.survey_limits import limit_at, limits_of, repeat_factor
-from tankcal.pipeline.wall.cause_correlations import noise_of_wall
+from tankcal.pipeline.checks.wall import (
+    check_nominal,
+    check_size_told,
+    courses_with_few,
+    girth_m,
+    levels_with_few,
+)
 from tankcal.pipeline.wall.finding import joints_of
+from tankcal.pipeline.wall.shared_unknowns import noise_of_wall
 from tankcal.survey.control_drift import repeats_of
 from tankcal.survey.sighting import NETWORK, WALL, certified_m, rays
 from tankcal.units import FULL_TURN, GON

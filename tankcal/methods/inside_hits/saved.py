@@ -76,7 +76,7 @@ def _incidence_classes(incidence_rad):
 
 def _compare_hits(hits, xyz_m, fit):
     """`ComparedInside` of each hit that is only compared."""
-    from tankcal.pipeline.solids.scanned_wall import offsets
+    from tankcal.pipeline.scanned_solids import offsets
 
     compared = np.flatnonzero(hits.check)
     departures_m = offsets(fit, xyz_m[compared])

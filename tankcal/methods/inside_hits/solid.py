@@ -22,11 +22,10 @@ from tankcal.errors import InputError, Problem
 from tankcal.geometry.cylinders import FittedCylinder
 from tankcal.messages import message
 from tankcal.methods.inside_hits.checks import offset_undeclared, untied_setup
-from tankcal.pipeline.overruling.points import decisions_of
-from tankcal.pipeline.solids.scan import NEVER_M, NEVER_PART, fit_scan
-from tankcal.pipeline.solids.scanned_wall import offsets
-from tankcal.pipeline.wall.point_covariance import s_transform
-from tankcal.pipeline.wall.sighted_points import take_points
+from tankcal.pipeline.overruling import decisions_of
+from tankcal.pipeline.scanned_solids import NEVER_M, NEVER_PART, fit_scan, offsets
+from tankcal.pipeline.wall.finding import take_points
+from tankcal.pipeline.wall.surveyed import s_transform
 from tankcal.survey.poses import poses_in_network, poses_of
 from tankcal.survey.sighting import WALL, sight
 

@@ -9,7 +9,7 @@ import numpy as np
 from tankcal.errors import Problem
 from tankcal.geometry.outlines import harmonics
 from tankcal.messages import message
-from tankcal.pipeline.checks.survey_limits import limits_of
+from tankcal.pipeline.checks.instruments import limits_of
 from tankcal.survey.reference_line import rises_of
 
 FILE, RULES = "offsets.csv", "reference_line"

@@ -9,7 +9,7 @@ from tankcal.adjust import SD_OVER_MEDIAN
 from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.methods.lines.departures import check_lines_apart, check_scale, check_sign
-from tankcal.pipeline.checks.survey_limits import limit_at, limits_of, repeat_factor
+from tankcal.pipeline.checks.instruments import limit_at, limits_of, repeat_factor
 from tankcal.survey.reference_line import (
     collimation_by_faces,
     lean_of,

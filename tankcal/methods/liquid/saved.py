@@ -341,7 +341,7 @@ def _causes(liquid):
 
 def _controls(liquid):
     """Return `LiquidControl` of each meter and of a steady leak; None if the table ignores them."""
-    from tankcal.pipeline.liquid.naming import is_steady_leak
+    from tankcal.pipeline.liquid.measuring import is_steady_leak
 
     rows = [
         LiquidControl(

@@ -6,8 +6,8 @@ from tankcal.adjust import CRITICAL
 from tankcal.errors import Problem
 from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import message
-from tankcal.pipeline.checks.survey_limits import limits_of_method
-from tankcal.pipeline.liquid.naming import causes_in_words, is_steady_leak, leak_unit
+from tankcal.pipeline.checks.instruments import limits_of_method
+from tankcal.pipeline.liquid.measuring import causes_in_words, is_steady_leak, leak_unit
 
 TOLD = 3  # largest number of steps reported individually
 FAR = 2 * CRITICAL  # test quantity from which a cause changes the table by more than U

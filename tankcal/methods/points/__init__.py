@@ -47,7 +47,7 @@ class PointsMethod(Method):
 
             return Surveyed(job, find_wall(job, progress, network.dof, network.amplitudes))
         from tankcal.messages import message
-        from tankcal.pipeline.solids.scan import fit_scan
+        from tankcal.pipeline.scanned_solids import fit_scan
 
         count = len(job.points.names)
         progress(message("fitting_wall", "fitting the wall to {count} points", count=count))

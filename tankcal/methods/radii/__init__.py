@@ -103,7 +103,7 @@ class RadiiMethod(Method):
         return job_as_declared(job)
 
     def inside_radii(self, job, survey):
-        from tankcal.pipeline.checks.nominal_size import radii_of_courses
+        from tankcal.pipeline.checks.size import radii_of_courses
 
         return radii_of_courses(job, survey.radius_m)
 

@@ -17,10 +17,10 @@ from tankcal.geometry.field.components import COMPONENTS, OVALITY_MODES, mode_sh
 from tankcal.geometry.field.estimate import LEVELS, gauss_heights
 from tankcal.geometry.girth import perimeter_excess
 from tankcal.messages import message
-from tankcal.pipeline.checks.nominal_size import InsideRadii
+from tankcal.pipeline.checks.size import InsideRadii
+from tankcal.pipeline.read_wall import names_of, readings_of_straps
 from tankcal.pipeline.tanks.common import factor_of_unseen, inside_end, is_warmed, thermal_scale
 from tankcal.pipeline.taped_wall import TapedWall, adjust_readings
-from tankcal.pipeline.wall_readings import names_of, readings_of_straps
 from tankcal.pipeline.wall_straps import AreaTerm, gauged_plates
 from tankcal.quadrature import panels
 from tankcal.survey.strapping import reduce_straps, tapes_used

@@ -17,11 +17,10 @@ from tankcal.methods.strapping.warnings import (
     read_once,
     straps_apart,
 )
-from tankcal.pipeline.checks.cross_checks import check_side
-from tankcal.pipeline.checks.nominal_size import allowed_departure_m, departure_of_size
-from tankcal.pipeline.checks.survey_limits import limits_of
-from tankcal.pipeline.compared_courses import exchanged_courses
-from tankcal.pipeline.wall_readings import names_of
+from tankcal.pipeline.checks.instruments import limits_of
+from tankcal.pipeline.checks.size import allowed_departure_m, check_side, departure_of_size
+from tankcal.pipeline.read_wall import names_of
+from tankcal.pipeline.taped_wall import exchanged_courses
 
 LIMITS = "repeats_lying"  # table of the rule file
 # Mean remaining step, as a share of a plate, below which an order of laps fits; also the least

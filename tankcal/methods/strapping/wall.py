@@ -14,15 +14,15 @@ import numpy as np
 
 from tankcal.geometry.girth import perimeter_excess
 from tankcal.messages import message
-from tankcal.pipeline.checks.nominal_size import radii_of_courses
-from tankcal.pipeline.tanks import insets_of, shell_zero
-from tankcal.pipeline.taped_wall import TapedWall, UprightAxis, adjust_readings
-from tankcal.pipeline.wall.finding import joints_of
-from tankcal.pipeline.wall_readings import (
+from tankcal.pipeline.checks.size import radii_of_courses
+from tankcal.pipeline.read_wall import (
     readings_of_offsets,
     readings_of_straps,
     readings_of_untold,
 )
+from tankcal.pipeline.tanks import insets_of, shell_zero
+from tankcal.pipeline.taped_wall import TapedWall, UprightAxis, adjust_readings
+from tankcal.pipeline.wall.finding import joints_of
 from tankcal.pipeline.wall_straps import AreaTerm, gauged_plates, told_courses, typical_shape_m
 from tankcal.survey.strapping import reduce_straps, tapes_used
 

@@ -11,16 +11,17 @@ from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.methods.base import completing_method
 from tankcal.methods.strapping.tape_warnings import check_tapes
-from tankcal.pipeline.checks.cross_checks import check_side, is_size_declared
+from tankcal.pipeline.checks.instruments import limit_at, limits_of
 from tankcal.pipeline.checks.moved_setups import tested
-from tankcal.pipeline.checks.nominal_size import (
+from tankcal.pipeline.checks.size import (
     allowed_departure_m,
+    check_side,
     departure_of_size,
+    is_size_declared,
     nominal_radius_m,
 )
-from tankcal.pipeline.checks.survey_limits import limit_at, limits_of
-from tankcal.pipeline.compared_courses import course_apart, exchanged_courses
-from tankcal.pipeline.wall_readings import FORMER
+from tankcal.pipeline.read_wall import FORMER
+from tankcal.pipeline.taped_wall import course_apart, exchanged_courses
 
 FILE = "circumferences.csv"
 # Largest slope that suggests plates not flush inside; smallest range of plates that shows it.

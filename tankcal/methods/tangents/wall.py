@@ -15,9 +15,8 @@ from tankcal.geometry.girth import support_of, tangent_excess
 from tankcal.geometry.shell import course_of
 from tankcal.messages import message
 from tankcal.methods.tangents.misread import refuse_limbs, refuse_misread, refuse_misread_zeniths
-from tankcal.pipeline.wall.finding import find_wall
-from tankcal.pipeline.wall.point_covariance import s_transform
-from tankcal.pipeline.wall.sighted_points import take_points
+from tankcal.pipeline.wall.finding import find_wall, take_points
+from tankcal.pipeline.wall.surveyed import s_transform
 from tankcal.pipeline.wall_straps import rings_of
 from tankcal.survey.poses import poses_in_network
 from tankcal.survey.sighting import WALL

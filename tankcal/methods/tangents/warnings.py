@@ -5,16 +5,20 @@ import numpy as np
 from tankcal.errors import Problem
 from tankcal.geometry.shell import course_of
 from tankcal.messages import message
-from tankcal.pipeline.checks.levels import (
+from tankcal.pipeline.checks.instruments import limits_of
+from tankcal.pipeline.checks.moved_setups import (
+    TANGENT_LIMITS,
+    judge_tangents,
+    least_tangents,
+    worst_setup,
+)
+from tankcal.pipeline.checks.wall import (
     check_nominal,
     check_size_told,
     courses_with_few,
     girth_m,
     levels_with_few,
 )
-from tankcal.pipeline.checks.moved_setups import worst_setup
-from tankcal.pipeline.checks.survey_limits import limits_of
-from tankcal.pipeline.checks.tangents import RULES, judge_tangents, least_tangents
 from tankcal.pipeline.wall.finding import joints_of
 
 MANY_LEVELS = 0.5  # share of wrong levels above which the heights as a whole are wrong
@@ -58,7 +62,7 @@ def _check_levels(job, wall):
             girth_m=girth_m(job),
         )
         yield Problem(job.tangents.file, text)
-    least = limits_of(RULES)["levels_a_course"]
+    least = limits_of(TANGENT_LIMITS)["levels_a_course"]
     weak_courses = courses_with_few(job, wall, least)
     if weak_courses:
         text = message(
@@ -82,7 +86,7 @@ def _check_limbs(job, touching):
     if not waves:
         return
     wave, share = sorted(waves, key=lambda wave_and_share: wave_and_share[1])[len(waves) // 2]
-    if share > limits_of(RULES)["wave_in_radius"]:
+    if share > limits_of(TANGENT_LIMITS)["wave_in_radius"]:
         text = message(
             "limbs_coincide",
             "the limbs of the set-ups fall on nearly the same places of the wall: of {wave} waves"
@@ -127,7 +131,7 @@ def _check_heights(job, touching):
     height = touching.points.xyz_m[:, 2] - job.datum.bottom_z_m
     off_m = height - job.datum.plate_level_m - tangents.level_m
     course_index = course_of(height, joints_of(job))
-    most_m, setup = limits_of(RULES)["level_m"], np.array(tangents.setup)
+    most_m, setup = limits_of(TANGENT_LIMITS)["level_m"], np.array(tangents.setup)
     is_far, off_by_setup = np.abs(off_m) > most_m, _high_setups(setup, off_m, most_m)
     for name, by_m in off_by_setup.items():
         text = message(

@@ -3,15 +3,44 @@
 Some inputs of horizontal tanks and spheres have a nonlinear effect on volumes: sizes, tilt and the
 zero of the table. They are moved to their estimates by liquid, step by step (Gauss-Newton). All
 other inputs have an almost linear effect and keep their values.
+
+Wall of an upright tank known from its drawing alone: nominal courses with large uncertainty.
+
+Such a wall interpolates between the dips of a calibration by liquid. Each course is a cylinder. Its
+radius differs from the nominal radius by the standard uncertainty in the job. Bulge and taper of a
+course are covered by prior components, as in a strapped wall.
+
+Geometry of a tank for a table by liquid alone: declared only, with wide uncertainties.
+
+Within the dips of the runs, such a geometry only interpolates. A vertical tank keeps its courses,
+each with a free radius. A horizontal tank keeps its form, with unknown sizes, tilt and zero. A
+sphere has an unknown diameter and zero, a mesh an unknown scale and zero.
 """
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from tankcal.job.model import DeclaredInput
+from tankcal.messages import message
+from tankcal.pipeline.checks.instruments import limits_of_method
+from tankcal.pipeline.read_wall import (
+    ReadWall,
+    WallReading,
+    factors_of_readings,
+    noise_of,
+    settle_readings,
+    sites_of,
+)
+from tankcal.pipeline.scanned_solids import Scan
 from tankcal.pipeline.simulation.curvature import vary_input
-from tankcal.pipeline.tanks import body_of, filled_with, zero_height
+from tankcal.pipeline.tanks import body_of, filled_with, insets_of, shell_zero, zero_height
+from tankcal.pipeline.tanks.solid import sized_job
+from tankcal.pipeline.tanks.vertical import nominal_inside_m
+from tankcal.pipeline.taped_wall import UprightAxis, field_of_readings
+from tankcal.pipeline.wall.finding import joints_of
+from tankcal.pipeline.wall_straps import mean_radii
 from tankcal.tank.service import shell_factor, solid_factor
 from tankcal.uncertainty import triangular
 
@@ -23,6 +52,12 @@ MOVED = (
     "dip_position",
 )  # nonlinear inputs of a solid, with ZERO
 ZERO = "datum"
+COMMON = 0.8  # share of the variance of a radius that is common to all courses
+KEPT = (  # inputs that describe the liquid, the parts and the elasticity, not the shape of the wall
+    *("plate_thickness", "shell_temperature", "expansion", "youngs_modulus"),
+    *("liquid_density", "roof_mass", "deadwood", "interpolation", "rounding"),
+)
+SIZES = ("diameter", "length", "end_depth", "tilt", "dip_position", "datum", "scale", "surface")
 
 
 @dataclass(frozen=True)
@@ -302,3 +337,149 @@ def wide_input(name, u, unit, as_read):
 def stacked(sources, rows):
     """Return the columns of all sources side by side, shape (rows, c)."""
     return np.hstack([np.zeros((rows, 0)), *(source.columns_m3 for source in sources)])
+
+
+# ---- wall of an upright tank known from its drawing alone
+
+
+@dataclass(frozen=True)
+class NominalWall(ReadWall):
+    """Wall from the drawing; a `ReadWall` whose readings are the nominal radii."""
+
+    surveyed_as = "nominal"
+    shell = UprightAxis()
+    without_inputs = ("offset",)
+    straps = None
+
+    @cached_property
+    def radius_m(self):
+        """Radius of each course on the side of the survey, m, shape (courses,)."""
+        return mean_radii(self.field)
+
+    def lowest_outline(self, azimuth_rad):
+        """Position (x, y) of the axis and radii (n,) of the first course, m."""
+        return 0.0, 0.0, np.full(len(azimuth_rad), self.radius_m[0])
+
+    def factors(self, job, weights):
+        """`Factor`s of the uncertainty of the drawing: common to all courses and of each."""
+        return factors_of_readings(self.accepted, weights)
+
+    def read_with(self, weights):
+        """Return no derivatives: no instrument input affects a nominal wall."""
+        return {}
+
+
+def find_nominal_wall(job, progress=lambda text: None):
+    """`NominalWall` of an upright job from its nominal diameter and courses.
+
+    The job's liquid section gives the standard uncertainty of a radius. Most of its variance is
+    common to all courses, because an error of the nominal diameter affects all courses.
+
+    Parameters
+    ----------
+    job : Job
+    progress : callable
+        Called with a line of text when the step begins.
+
+    Returns
+    -------
+    NominalWall
+    """
+    progress(message("nominal_wall", "taking the wall of the drawing, which liquid will measure"))
+    joints, zero, sd = joints_of(job), shell_zero(job, None), job.liquid.u_radius_m
+    insets = insets_of(job, job.switches)
+    inside = [nominal_inside_m(job, course) for course in job.courses]
+    common = sd * np.sqrt(COMMON)
+    readings = [
+        WallReading(
+            "nominal_radius",
+            number,
+            (joints[number] + joints[number + 1]) / 2 - zero,
+            radius + inset,
+            sd * np.sqrt(1 - COMMON),
+            effects={("nominal_radius_of_all", ""): (1000 * common, "mm", common)},
+        )
+        for number, (radius, inset) in enumerate(zip(inside, insets, strict=True))
+    ]
+    sites, noise = sites_of(readings, joints, zero), noise_of(readings)
+
+    def field_of(accepted):
+        return field_of_readings(sites, readings, noise, job.tank.nominal_diameter_m / 2)
+
+    none_rejected = np.zeros(len(readings), dtype=bool)
+    radius = np.array([reading.radius_m for reading in readings])
+    field, tested = settle_readings(
+        field_of(none_rejected), field_of, (sites, radius, noise), none_rejected
+    )
+    return NominalWall(joints, zero, tuple(readings), np.arange(len(readings)), tested, field)
+
+
+# ---- geometry of a tank for a table by liquid alone: declared only, with wide uncertainties
+
+
+def geometry_beside(job, survey):
+    """Return the `Geometry` that is adjusted with the runs of a job.
+
+    Sizes without any information get wide uncertainties.
+    """
+    if isinstance(survey, NominalWall):
+        return Geometry(job, survey, told_by_liquid=SIZES)
+    if job.tank.kind == "vertical" or job.points is not None:
+        return Geometry(job, survey)
+    if any(declared.name in SIZES for declared in job.inputs):
+        return Geometry(job, survey)
+    widened = replace(job, inputs=(*job.inputs, *_wide_inputs(job)))
+    return Geometry(widened, survey, told_by_liquid=SIZES)
+
+
+def geometry_alone(job, survey):
+    """Return a `Geometry` with almost no information, for the table of liquid alone."""
+    kept_inputs = tuple(declared for declared in job.inputs if declared.name in KEPT)
+    bare = replace(
+        job, inputs=kept_inputs, correlations=_correlations_between(job.correlations, kept_inputs)
+    )
+    if job.tank.kind == "vertical":
+        bare = replace(
+            bare, points=None, strapping=None, lines=None, hits=None, tangents=None, clouds=None,
+            survey=replace(bare.survey, liquid_level_m=None, liquid_density_kg_m3=None),
+        )  # fmt: skip
+        wall = survey if isinstance(survey, NominalWall) else find_nominal_wall(bare)
+        return Geometry(bare, wall, told_by_liquid=(*SIZES, "course_heights"))
+    if isinstance(survey, Scan):
+        bare, survey = replace(sized_job(bare, survey), points=None), None
+    widened = replace(bare, inputs=(*kept_inputs, *_wide_inputs(bare)))
+    return Geometry(widened, survey, told_by_liquid=SIZES)
+
+
+def _wide_inputs(job):
+    """Inputs of sizes with almost no information."""
+    wide = limits_of_method("tankcal.pipeline.liquid")["wide"]
+    zero = wide_input("datum", wide["zero_mm"] / 1000, "mm", wide["zero_mm"])
+    if job.horizontal is not None:
+        lying = job.horizontal
+        diameter = wide["size"] * (lying.width_m + lying.height_m) / 2
+        length, tilt = wide["size"] * lying.length_m, wide["tilt_mm_per_m"]
+        return (
+            wide_input("diameter", diameter, "mm", 1000 * diameter),
+            wide_input("length", length, "mm", 1000 * length),
+            wide_input("tilt", tilt / 1000, "mm/m", tilt),
+            zero,
+        )
+    if job.sphere is not None:
+        diameter = wide["size"] * job.sphere.diameter_m
+        return (wide_input("diameter", diameter, "mm", 1000 * diameter), zero)
+    return (wide_input("scale", wide["scale"], "ppm", 1e6 * wide["scale"]), zero)
+
+
+def _correlations_between(correlations, kept):
+    """Correlations between the kept inputs only."""
+    names = {declared.name for declared in kept}
+    return tuple(
+        correlation for correlation in correlations if {correlation[0], correlation[1]} <= names
+    )
+
+
+def filled_range_m(metering):
+    """Return the lowest and the highest dip used, m."""
+    dips = metering.dip_m[metering.used & np.isfinite(metering.dip_m)]
+    return float(dips.min()), float(dips.max())

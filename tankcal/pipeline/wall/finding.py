@@ -20,28 +20,31 @@ from tankcal.methods.base import (
     given_methods,
     is_sighted,
 )
-from tankcal.pipeline.checks.homogeneity import warn_of_sections
+from tankcal.pipeline.checks.instruments import limits_of
 from tankcal.pipeline.checks.survey import (
     noise_is_estimated,
     origin_of,
     warn_of_vague_points,
     warn_of_vague_vertical,
 )
-from tankcal.pipeline.checks.survey_limits import limits_of
 from tankcal.pipeline.checks.wall import (
     ADVISED_POINTS,
     FEWEST_POINTS,
     check_shell,
+    warn_of_sections,
     warn_of_taper,
     weak_sections,
 )
-from tankcal.pipeline.overruling.points import decisions_of, refuse_kept
-from tankcal.pipeline.wall.point_covariance import given_covariance, median_sd, radial_sds
-from tankcal.pipeline.wall.surveyed import Wall
-from tankcal.pipeline.wall.told_unknowns import told_unknowns, with_spread
-from tankcal.pipeline.wall.undecided_columns import undecided_halves
-from tankcal.pipeline.wall.untied_setups import unbound_of
-from tankcal.pipeline.wall_readings import noise_by_inputs
+from tankcal.pipeline.overruling import decisions_of, refuse_kept
+from tankcal.pipeline.read_wall import noise_by_inputs
+from tankcal.pipeline.wall.shared_unknowns import told_unknowns, unbound_of, with_spread
+from tankcal.pipeline.wall.surveyed import (
+    Wall,
+    given_covariance,
+    median_sd,
+    radial_sds,
+    undecided_halves,
+)
 from tankcal.pipeline.wall_straps import PointsOfWall, join_readings, told_courses
 from tankcal.sections import (
     coordinates_of,
@@ -471,3 +474,68 @@ def _to_fit(job, shell, accepted, groups, covariance):
         )
         for group in groups
     ]
+
+
+# ---- points of a wall from sights: selection, and the side of the wall that they are on
+
+
+def take_points(points, chosen):
+    """Return selected points (k,), with their covariance and their causes."""
+    if np.array_equal(chosen, np.arange(len(points.names))):  # the covariance may be large
+        return points
+    index = coordinates_of(chosen)
+
+    def select(values):
+        return tuple(values[i] for i in chosen)
+
+    def select_columns(causes):
+        return tuple(replace(cause, column_m=cause.column_m[index]) for cause in causes)
+
+    return replace(
+        points,
+        names=select(points.names),
+        xyz_m=points.xyz_m[chosen],
+        covariance_m2=points.covariance_m2[np.ix_(index, index)],
+        section=select(points.section),
+        generatrix=select(points.generatrix),
+        rows=select(points.rows),
+        causes=select_columns(points.causes),
+        unbound=select_columns(points.unbound),
+        by_inputs={name: column[index] for name, column in points.by_inputs.items()},
+    )
+
+
+def through_wall(job, points, normal, is_moved):
+    """Move points of a vertical wall to its other side.
+
+    Parameters
+    ----------
+    job : Job
+    points : Points
+    normal : ndarray, shape (n, 3)
+        Normals of the wall, outwards.
+    is_moved : ndarray of bool, shape (n,)
+        Points that are not on the side of the survey.
+
+    Returns
+    -------
+    Points
+        With the derivatives by plate thickness and paint.
+    """
+    joints = job.datum.bottom_z_m + joints_of(job)
+    course = course_of(points.xyz_m[:, 2], joints)
+    outwards = 1.0 if job.survey.side == "outside" else -1.0
+    normal = (outwards * is_moved)[:, None] * normal
+    switches = {"plate_thickness": job.switches.plate, "paint": job.switches.paint}
+    sizes = {
+        "plate_thickness": np.array([part.thickness_m for part in job.courses])[course],
+        "paint": np.array([part.paint_m for part in job.courses])[course],
+    }
+    size = sum(switches[name] * thickness for name, thickness in sizes.items())
+    xyz = points.xyz_m + size[:, None] * normal
+    derivatives = {
+        name: normal.ravel()
+        for name, thickness in sizes.items()
+        if switches[name] and thickness.any()
+    }
+    return replace(points, xyz_m=xyz, by_inputs=derivatives)

@@ -1,6 +1,13 @@
-"""Wall of a tank surveyed by points, with additional straps and reference lines."""
+"""Wall of a tank surveyed by points, with additional straps and reference lines.
 
-from dataclasses import dataclass, field
+Columns of points that belong either to the wall or to a fitting, and their uncertainty.
+
+The table lies midway between the wall with such a column and the wall without it. Half of the
+difference is the standard uncertainty, as for a quantity with two equally probable values. U is
+about twice this half and covers both.
+"""
+
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -8,19 +15,114 @@ import scipy.sparse
 
 from tankcal.geometry.field.estimate import WallField
 from tankcal.geometry.field.section_noise import noise_of_sections
-from tankcal.geometry.shell import Shell
-from tankcal.pipeline.read_wall import ReadWall
-from tankcal.pipeline.wall.told_unknowns import ToldUnknowns
-from tankcal.pipeline.wall.undecided_columns import factors_of_undecided
-from tankcal.pipeline.wall_readings import (
+from tankcal.geometry.shell import UNDECIDED, Shell
+from tankcal.messages import list_some, message
+from tankcal.pipeline.read_wall import (
+    ReadWall,
     factors_of_plates,
     factors_of_readings,
     inputs_read_with,
     names_of,
 )
+from tankcal.pipeline.wall.shared_unknowns import ToldUnknowns
 from tankcal.pipeline.wall_straps import Straps
 from tankcal.sections import Section, coordinates_of
+from tankcal.tank.body import Factor
 from tankcal.tank.budgets import survey_factors
+
+ALIKE = 1 / 3  # correlation of two columns, for a share of wall uniform from 0 to 1
+
+
+# ---- columns of points that belong either to the wall or to a fitting, and their uncertainty
+
+
+def undecided_halves(shell, accepted, groups):
+    """Half of the deviation of points in undecided columns from the wall without them.
+
+    Parameters
+    ----------
+    shell : Shell
+    accepted : ndarray of int, shape (m,)
+        Points on the wall, or in such columns.
+    groups : sequence of Group
+        Groups of indices into `accepted`.
+
+    Returns
+    -------
+    ndarray, shape (m, columns)
+        In the order of the groups' members, m.
+    """
+    order = accepted[np.concatenate([group.members for group in groups])]
+    columns = np.arange(shell.column.max(initial=-1) + 1)
+    return 0.5 * shell.residual_m[order, None] * np.equal.outer(shell.column[order], columns)
+
+
+def factors_of_undecided(halves):
+    """`Factor`s of the uncertainty due to undecided columns; () without any.
+
+    Parameters
+    ----------
+    halves : ndarray, shape (f, columns)
+        Half of the change of the features due to each column.
+
+    Returns
+    -------
+    tuple of Factor
+
+    Notes
+    -----
+    Column i belongs to the wall with an unknown probability p. For p uniform from 0 to 1 its
+    variance is 1/4. The covariance of two columns is the variance of p, 1/12. Therefore many seams
+    or many pipes of a tank do not average out.
+
+    Examples
+    --------
+    >>> factor, = factors_of_undecided(np.array([[3.0, 3.0]]))
+    >>> round(float(np.sum(factor.columns**2)), 9)  # 9 + 9, and twice 9 / 3
+    24.0
+    """
+    if not np.any(halves):
+        return ()
+    # One part per column and one common part give equal correlations `ALIKE`.
+    separate, common = (
+        np.sqrt(1 - ALIKE) * halves,
+        np.sqrt(ALIKE) * halves.sum(axis=1, keepdims=True),
+    )
+    return (Factor("undecided", np.hstack([separate, common])),)
+
+
+def tell_undecided(names, shell, most):
+    """Text of a warning that names the points in undecided columns, in a tuple; () without any.
+
+    Parameters
+    ----------
+    names : sequence of str, length n
+        Names of the points.
+    shell : Shell
+    most : int
+        Largest number of names in the text.
+
+    Returns
+    -------
+    tuple
+    """
+    undecided = np.flatnonzero(shell.reason == UNDECIDED)
+    if not len(undecided):
+        return ()
+    return (
+        message(
+            "undecided_columns",
+            "{count} points one above another, up to {deep_mm:.0f} mm off the wall, may be a seam "
+            "of it, or a pipe or bracket before it ({points}): the table lies halfway, and U has "
+            "the difference; take out the points of fittings, or keep all with snooping = false",
+            count=len(undecided),
+            deep_mm=1000 * np.abs(shell.residual_m[undecided]).max(),
+            points=list_some([names[i] for i in undecided], most),
+        ),
+    )
+
+
+# ---- wall of a tank surveyed by points, with additional straps and reference lines
 
 
 @dataclass(frozen=True)
@@ -192,3 +294,119 @@ class Wall:
     def points_read(self):
         """Number of readings of the field that are points."""
         return len(self.field.radius_m) - len(self.readings)
+
+
+# ---- covariance of surveyed points: as given, by S-transformation, and as scatter in plan
+
+
+def s_transform(points):
+    """Adjusted points with the covariance of their relative positions (S-transformation).
+
+        C' = S C S + s2 D D',   S = I - D D'
+
+    D is an orthonormal basis of the common shift and rotation about the vertical, and s2 is the
+    mean remaining variance. No volume depends on these four parameters. A datum fixed by one photo
+    or one point would give them an arbitrary variance, on which the fitted sections would depend.
+
+    Parameters
+    ----------
+    points : Points
+        n points with covariance_m2 (3n, 3n), m2.
+
+    Returns
+    -------
+    Points
+        With C', and with the columns of their causes projected by S.
+    """
+    basis, covariance = common_motions(points.xyz_m), points.covariance_m2
+    across = s_transform_factors(basis, covariance @ basis, np.trace(covariance))
+    change = np.hstack([basis, across]) @ np.hstack([across, basis]).T
+    causes = tuple(
+        replace(cause, column_m=cause.column_m - basis @ (basis.T @ cause.column_m))
+        for cause in points.causes
+    )
+    return replace(points, covariance_m2=np.subtract(covariance, change, out=change), causes=causes)
+
+
+def common_motions(xyz_m):
+    """Orthonormal basis of the shifts of points and of their rotation about the vertical.
+
+    Parameters
+    ----------
+    xyz_m : ndarray, shape (n, 3)
+        Coordinates, m.
+
+    Returns
+    -------
+    ndarray, shape (3 n, 4)
+        Orthonormal columns, in the order x, y, z of each point.
+
+    Examples
+    --------
+    >>> basis = common_motions(np.array([[0.0, 0, 0], [4, 0, 0], [0, 3, 1]]))
+    >>> bool(np.allclose(basis.T @ basis, np.eye(4)))
+    True
+    """
+    x, y, _ = (xyz_m - xyz_m.mean(axis=0)).T
+    motions = np.zeros((len(x), 3, 4))
+    motions[:, :, :3] = np.eye(3)
+    motions[:, 0, 3], motions[:, 1, 3] = -y, x
+    return np.linalg.qr(motions.reshape(-1, 4))[0]
+
+
+def s_transform_factors(basis, spread, trace):
+    """Matrix A of C' = C - D A' - A D', the covariance of `s_transform`, without forming S C S.
+
+        A = C D - D (D'C D + s2 I) / 2
+
+    Parameters
+    ----------
+    basis : ndarray, shape (3 n, 4)
+        D, from `common_motions`.
+    spread : ndarray, shape (3 n, 4)
+        C D, m2.
+    trace : float
+        Trace of C, m2.
+
+    Returns
+    -------
+    ndarray, shape (3 n, 4)
+        A, m2.
+
+    Examples
+    --------
+    >>> basis = common_motions(np.array([[0.0, 0, 0], [4, 0, 0], [0, 3, 1]]))
+    >>> a = s_transform_factors(basis, basis, trace=9.0)  # of C = I nothing changes
+    >>> bool(np.allclose(a, 0))
+    True
+    """
+    across = spread - 0.5 * basis @ (basis.T @ spread)
+    remaining_trace = trace - 2 * np.sum(basis * across)
+    # The trace of C' shared equally by the 3n - 4 remaining parameters gives s2.
+    return across - 0.5 * max(remaining_trace, 0.0) / (len(basis) - 4) * basis
+
+
+def radial_sds(points):
+    """Standard deviations (n,) of the points in plan, m; None if the file gives none."""
+    if points.covariance_m2 is not None:
+        variances = points.covariance_m2.diagonal().reshape(-1, 3)
+    elif points.sd_m is not None:
+        variances = points.sd_m**2
+    else:
+        return None
+    return np.sqrt(variances[:, :2].mean(axis=1))
+
+
+def median_sd(sds):
+    """Median standard deviation of the points in plan, m; 1 m if the file gives none."""
+    return 1.0 if sds is None else float(np.median(sds))
+
+
+def given_covariance(points, wall):
+    """Covariance (3m, 3m) from the file, m2; 1 m for each coordinate if the file gives none."""
+    if points.covariance_m2 is not None:
+        index = coordinates_of(wall)
+        return points.covariance_m2[np.ix_(index, index)]
+    if points.sd_m is not None:
+        return scipy.sparse.diags_array(points.sd_m[wall].ravel() ** 2).tocsr()
+    return scipy.sparse.eye_array(3 * len(wall), format="csr")

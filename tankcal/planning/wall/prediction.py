@@ -11,15 +11,15 @@ from tankcal.geometry.field.components import COMPONENTS
 from tankcal.geometry.field.estimate import LEVELS
 from tankcal.job.model import Job
 from tankcal.methods.base import count_readings, given_methods, supplement_of
-from tankcal.pipeline.checks.homogeneity import OF_SCATTER
+from tankcal.pipeline.checks.wall import OF_SCATTER
+from tankcal.pipeline.liquid.geometry import NominalWall
 from tankcal.pipeline.liquid.measuring import Measured
-from tankcal.pipeline.liquid.nominal_wall import NominalWall
 from tankcal.pipeline.liquid.result import LiquidResult
 from tankcal.pipeline.statements import statements
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.table import ComputedTable, check_table, compute_table
 from tankcal.pipeline.taped_wall import TapedWall
-from tankcal.pipeline.wall.cause_correlations import noise_of_wall
+from tankcal.pipeline.wall.shared_unknowns import noise_of_wall
 from tankcal.planning.table import TableResults, refuse_without_delivery
 from tankcal.planning.wall.filling import (
     FillingOutlook,

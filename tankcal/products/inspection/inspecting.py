@@ -9,7 +9,7 @@ from tankcal.errors import Problem
 from tankcal.job.folder import OF_INSPECTIONS
 from tankcal.job.tables import Log
 from tankcal.messages import message
-from tankcal.pipeline.clouds.passes import Reading
+from tankcal.pipeline.cloud_passes import Reading
 from tankcal.products.inspection.basis import RECORD, read_basis
 from tankcal.products.inspection.edges import assess_edges
 from tankcal.products.inspection.levelling import read_edge_profiles, read_settlement

@@ -1,4 +1,4 @@
-"""Manual decisions about points of the wall and about readings, applied to the data of a job."""
+"""Manual decisions against the outlier search: their effect on points and on the result."""
 
 from dataclasses import replace
 
@@ -6,6 +6,8 @@ import numpy as np
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
+
+# ---- manual decisions about points of the wall and about readings, applied to the data of a job
 
 
 def decisions_of(job):

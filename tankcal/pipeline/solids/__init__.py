@@ -1,1 +1,0 @@
-"""Horizontal cylinders and spheres fitted to points."""
