@@ -20,8 +20,8 @@ from tankcal.uncertainty import (
     combine,
     declared_source,
     factor_of,
-    type_of,
     scale_source,
+    type_of,
 )
 
 HALF_A_LITRE_M3 = 5e-4  # half-width of the rounding of a row to whole litres

@@ -37,12 +37,10 @@ from tankcal.methods.lines import warnings as lines_warnings
 from tankcal.methods.liquid import columns as liquid_columns
 from tankcal.methods.liquid import facts as liquid_facts
 from tankcal.methods.strapping import tape_warnings
-from tankcal.pipeline import cluster
-from tankcal.pipeline.checks import homogeneity
+from tankcal.pipeline import cluster, scanned_solids
 from tankcal.pipeline.checks import wall as wall_checks
 from tankcal.pipeline.liquid import adjustment as liquid_steps
-from tankcal.pipeline.simulation import model as simulation_model
-from tankcal.pipeline.solids import scan, scanned_wall
+from tankcal.pipeline.simulation import table as simulation_model
 from tankcal.pipeline.wall_straps import typical_shape_m
 from tankcal.products.gauge import deviation
 from tankcal.products.gauge import reading as gauge
@@ -265,7 +263,7 @@ LIMITS = [
     (
         "docs/wall-hits.md",
         "over () % of the radius plus () mm off the wall",
-        [PERCENT * scan.NEVER_PART, MM * scan.NEVER_M],
+        [PERCENT * scanned_solids.NEVER_PART, MM * scanned_solids.NEVER_M],
     ),
     (
         "docs/wall-hits.md",
@@ -771,8 +769,8 @@ LIMITS += [
         "measured at one height, () % of the course or more off its middle",
         [PERCENT * wall_checks.OFF_MIDDLE],
     ),
-    ("docs/uncertainty.md", "if one of them fails at () %", [PERCENT * homogeneity.LEVEL]),
-    ("docs/uncertainty.md", "all sections together at () %", [PERCENT * homogeneity.LEVEL]),
+    ("docs/uncertainty.md", "if one of them fails at () %", [PERCENT * wall_checks.LEVEL]),
+    ("docs/uncertainty.md", "all sections together at () %", [PERCENT * wall_checks.LEVEL]),
     (
         "docs/uncertainty.md",
         "with a median of () mm off the wall at most",
@@ -790,11 +788,11 @@ LIMITS += [
         "other points (with more than 600 points, off the median of () neighbours). It is also "
         "rejected if it is farther than () % of the radius and () mm",
         [
-            MM * scanned_wall.DENT_M,
-            scan.FAR,
-            scanned_wall.NEIGHBOURS,
-            PERCENT * scan.NEVER_PART,
-            MM * scan.NEVER_M,
+            MM * scanned_solids.DENT_M,
+            scanned_solids.FAR,
+            scanned_solids.NEIGHBOURS,
+            PERCENT * scanned_solids.NEVER_PART,
+            MM * scanned_solids.NEVER_M,
         ],
     ),
     (
