@@ -47,7 +47,9 @@ def add_shared_register(raw, log):
         return raw
     data = read_bytes(path, log, MAX_SETTINGS_BYTES)
     register = None if data is None else parse_register(path.name, data, log, EQUIPMENT)
-    files = raw.files if data is None else (*raw.files, fingerprint(path.name, data))
+    # `tankcal verify` finds the file by its place relative to the job.
+    file = fingerprint(Path(name).as_posix(), data) if data is not None else None
+    files = (*raw.files, file) if file else raw.files
     return replace(raw, registers=raw.registers | {EQUIPMENT: register}, files=files)
 
 

@@ -9,6 +9,7 @@ from math import hypot
 from tankcal.job.plausibility_table import CODES
 from tankcal.methods.base import methods
 from tankcal.report import blocks
+from tankcal.report.scope import find_capability, is_outside_scope
 from tankcal.report.tables.facts import (
     CERTIFICATE,
     REFERENCES,
@@ -173,6 +174,10 @@ def statements(paper):
     words = ("certificate.only_items", "texts.copy", "certificate.digits")
     sentences = [paper.word(word) for word in words]
     sentences += rule.get("statements", [])
+    if is_outside_scope(paper.letterhead, paper.record):
+        sentences.append(paper.word("certificate.outside_scope"))
+    elif capability := find_capability(paper.letterhead, paper.record):
+        sentences.append(paper.word("certificate.cmc", percent=f"{capability['percent']:g}"))
     if missing:
         sentences.append(paper.word("certificate.not_given", missing=", ".join(missing)))
     return blocks.listing(sentences)

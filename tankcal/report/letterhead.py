@@ -14,6 +14,8 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from tankcal.errors import InputError, Problem, reason_of
+from tankcal.job.contract.kinds import KINDS
+from tankcal.job.contract.shorthand import number, positive
 from tankcal.job.entries import read_section
 from tankcal.job.fields import Field
 from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml
@@ -51,6 +53,18 @@ _COLOURS = (
     Field("line", "text", "of thin rules, such as #9aa5b1", start="#9aa5b1"),
 )
 _SECTIONS = {"laboratory": _LABORATORY, "colours": _COLOURS}
+CMC = "cmc"  # sections [cmc.NAME]
+_CAPABILITY = (
+    Field("tanks", "names", "kinds of tank of this entry of the scope", required=True),
+    number("from_m3", "smallest capacity of this entry, m3; blank: 0", 0, 1e9),
+    number("to_m3", "largest capacity of this entry, m3; blank: no limit", 0, 1e9),
+    positive(
+        "percent",
+        "smallest expanded uncertainty of a capacity in the scope, percent of the capacity",
+        100,
+        required=True,
+    ),
+)
 
 
 def logo_problem(kind, data):
@@ -168,6 +182,28 @@ class Logo:
 
 
 @dataclass(frozen=True)
+class Capability:
+    """Calibration and measurement capability (CMC) of a laboratory for some tanks.
+
+    Attributes
+    ----------
+    name : str
+    tanks : tuple of str
+        Kinds of tank.
+    from_m3, to_m3 : float or None
+        Range of the capacities; None: no limit.
+    percent : float
+        Smallest expanded uncertainty of a capacity, percent of the capacity.
+    """
+
+    name: str
+    tanks: tuple[str, ...]
+    from_m3: float | None
+    to_m3: float | None
+    percent: float
+
+
+@dataclass(frozen=True)
 class Letterhead:
     """Letterhead of a laboratory.
 
@@ -182,6 +218,8 @@ class Letterhead:
         Colours "ink" and "line" as #rrggbb.
     mark : Logo, PLACE or None
         Accreditation mark of the certificate; PLACE: an empty frame.
+    cmc : tuple of Capability
+        Scope of the accreditation; (): not stated.
     """
 
     name: str
@@ -189,10 +227,13 @@ class Letterhead:
     logo: Logo | None
     colours: dict
     mark: Logo | str | None = None
+    cmc: tuple[Capability, ...] = ()
 
     def data(self):
         """Return the letterhead as a dict for a document block."""
-        return asdict(self) | {"address": list(self.address)}
+        data = asdict(self) | {"address": list(self.address)}
+        cmc = [capability | {"tanks": list(capability["tanks"])} for capability in data.pop(CMC)]
+        return data | ({CMC: cmc} if cmc else {})
 
     def save(self, directory):
         """Write the letterhead into the folder of the notebook and return the file name."""
@@ -216,10 +257,12 @@ def _parsed(path, data, log):
     if settings is None:
         return None
     for section in settings:
-        if section not in _SECTIONS and (section or settings[section]):
+        # Sections above a section, such as "" and "cmc", are empty.
+        is_known = section in _SECTIONS or section.startswith(f"{CMC}.")
+        if not is_known and (settings[section] or section not in ("", CMC)):
             expected = message(
                 "unknown_section_of_letterhead",
-                "unknown section; expected [laboratory] or [colours]{hint}",
+                "unknown section; expected [laboratory], [colours] or [cmc.NAME]{hint}",
                 hint=nearest(section, _SECTIONS),
             )
             log.problem(path.name, expected, rows.get(section), f"[{section}]")
@@ -237,11 +280,34 @@ def _parsed(path, data, log):
     logo, mark = (
         _read_logo(path, laboratory, given, log, key) for key in ("logo", "accreditation")
     )
+    cmc = _capabilities(path.name, settings, rows, log)
     if log.problems:
         return None
     if mark is None and laboratory["accreditation_place"]:
         mark = PLACE
-    return Letterhead(laboratory["name"], laboratory["address"] or (), logo, colours, mark)
+    return Letterhead(laboratory["name"], laboratory["address"] or (), logo, colours, mark, cmc)
+
+
+def _capabilities(file, settings, rows, log):
+    """Return the Capability of each section [cmc.NAME]; problems go to the log."""
+    capabilities = []
+    for section, given in settings.items():
+        prefix, _, name = section.partition(".")
+        if prefix != CMC or not name:
+            continue
+        values = read_section(file, section, _CAPABILITY, given, rows.get(section), log)
+        for kind in values["tanks"] or ():
+            if kind not in KINDS:
+                expected = message(
+                    "no_kind_of_cmc",
+                    "found {kind!r}; expected {kinds}{hint}",
+                    kind=kind,
+                    kinds=", ".join(KINDS),
+                    hint=nearest(kind, KINDS),
+                )
+                log.problem(file, expected, given["tanks"].row, f"{section}.tanks")
+        capabilities.append(Capability(name, **values))
+    return tuple(capabilities)
 
 
 def _colour(file, field, values, given, log):
@@ -340,11 +406,16 @@ def data_problem(data):
     """Return a message about an invalid letterhead dict, or None if the dict is valid."""
     shape = {"name": str, "address": list, "logo": dict | None, "colours": dict}
     shape |= {"mark": dict | str | None} if isinstance(data, dict) and "mark" in data else {}
+    shape |= {CMC: list} if isinstance(data, dict) and CMC in data else {}
     if not _has_shape(data, shape) or not all(isinstance(line, str) for line in data["address"]):
         return f"is no letterhead: expected {', '.join(shape)}"
     if set(data["colours"]) != {field.name for field in _COLOURS}:
         return f"expected the colours {', '.join(field.name for field in _COLOURS)}"
     problems = [colour_problem(*item) for item in data["colours"].items()]
+    kinds = {"name": str, "tanks": list, "percent": int | float}
+    kinds |= dict.fromkeys(("from_m3", "to_m3"), int | float | None)
+    if not all(_has_shape(capability, kinds) for capability in data.get(CMC, ())):
+        problems.append(f"expected {', '.join(kinds)} in each of its cmc")
     mark = data.get("mark")
     if isinstance(mark, str):
         problems.append(None if mark == PLACE else f"its mark is {mark!r}, expected {PLACE!r}")

@@ -16,6 +16,7 @@ from tankcal.record.columns import as_columns
 from tankcal.report import attachments, blocks
 from tankcal.report.letterhead import read_saved
 from tankcal.report.plain import Column, PlainPaper
+from tankcal.report.scope import letterhead_in_scope
 from tankcal.text.words import (
     choice_sentence,
     input_name,
@@ -114,7 +115,7 @@ class Paper(PlainPaper):
             notice=str(certificate.get("notice", "")),
             running=[left, tank],
             footer=self._footer(),
-            letterhead=self.letterhead,
+            letterhead=letterhead_in_scope(self.letterhead, self.record),
             attachments=self._attachments(part),
             record_sha256=self.digest or "",
         )

@@ -9,7 +9,15 @@ from tankcal.job.tables import COVARIANCE_FILE
 from tankcal.messages import message
 from tankcal.record import long_tables
 from tankcal.record import manifest as manifests
-from tankcal.report.letterhead import LETTERHEAD_FILE, PLACE, Letterhead, Logo, read_saved
+from tankcal.report.letterhead import (
+    CMC,
+    LETTERHEAD_FILE,
+    PLACE,
+    Capability,
+    Letterhead,
+    Logo,
+    read_saved,
+)
 from tankcal.report.paper_content import content_of_paper
 from tankcal.report.verified_files import compare_inputs
 from tankcal.text.shipped import LANGUAGES
@@ -28,7 +36,11 @@ def letterhead_of(folder):
     data = read_saved(path)
     logo, mark = (part if part in (None, PLACE) else Logo(**part)
                   for part in (data["logo"], data["mark"]))  # fmt: skip
-    return Letterhead(data["name"], tuple(data["address"]), logo, data["colours"], mark)
+    cmc = tuple(
+        Capability(**{**capability, "tanks": tuple(capability["tanks"])})
+        for capability in data.get(CMC, ())
+    )
+    return Letterhead(data["name"], tuple(data["address"]), logo, data["colours"], mark, cmc)
 
 
 def make_papers_again(verification, folder, manifest, rebuild, versions=None):

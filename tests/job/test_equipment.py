@@ -56,7 +56,7 @@ def test_jobs_share_the_register_of_a_laboratory(tmp_path):
     folder = write_job(tmp_path, dated(), keys, place="../equipment.toml")
     job = tankcal.load(folder)
     assert [item.name for item in job.equipment] == ["T-3"]
-    assert "equipment.toml" in [file.file for file in job.files]
+    assert "../equipment.toml" in [file.file for file in job.files]
     assert tankcal.load(EXAMPLE).equipment == ()
 
 
@@ -115,3 +115,15 @@ def test_equipment_is_on_the_certificate(tmp_path):
     values = [item.text for item in root.iter() if item.tag.endswith("}value")]
     assert {"2024/118", "3012345"} <= set(values)
     assert main(["verify", str(out)]) == 0
+
+
+@pytest.mark.slow
+def test_results_of_a_shared_register_are_verified(tmp_path, capsys):
+    keys = ['equipment_register = "../equipment.toml"']
+    folder = write_job(tmp_path, dated(), keys, place="../equipment.toml")
+    assert main(["run", str(folder), "--quiet", "--no-papers"]) == 0
+    assert main(["verify", str(folder / "results")]) == 0
+    (tmp_path / "equipment.toml").write_text(dated(due="2091-01-01"), encoding="utf-8")
+    capsys.readouterr()
+    assert main(["verify", str(folder / "results")]) == 2
+    assert "../equipment.toml: was changed after the run" in capsys.readouterr().out

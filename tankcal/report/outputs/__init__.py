@@ -188,7 +188,9 @@ def _write(prepare, directory, progress, language=None, letterhead=None, papers=
 def _write_papers(record, folder, progress, language, letterhead):
     """Write workbook, digital certificate, notebook, PDFs and web page beside the record."""
     from tankcal.report import workbook  # takes a second; record and tables do not need it
+    from tankcal.report.scope import refuse_below_capability
 
+    refuse_below_capability(letterhead, record)
     progress(message("writing_workbook", "writing the workbook"), 0, 1)
     tank_file, survey_file = WORKBOOKS
     name = tank_file if record["capacity"] else survey_file
