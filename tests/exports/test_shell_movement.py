@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from page_figures import agree, figures_of
 
 from tankcal.products.exports.exporting import gauge_correction, shortening_m
 
@@ -37,6 +38,11 @@ def test_line_of_s1():
     found = gauge_correction(8.4, S1, 850, 206e9)
     assert found.start_m == pytest.approx(2.46, abs=0.01)
     assert round(1000 * found.factor, 4) == 0.0618
+    printed = figures_of(
+        "docs/exports.md",
+        "() kg/m3, has () m and () mm/m, with an error of at most () mm",
+    )
+    assert agree([850, found.start_m, 1000 * found.factor, 1000 * found.off_m], printed)
     assert round(1000 * found.off_m, 3) == 0.030
 
 

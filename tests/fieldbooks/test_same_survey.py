@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from page_figures import figures_of
 from simulated_fieldbooks import base_job, one_stand, two_stands
 from written_fieldbooks import PROFILE, WRITERS, gsi, jobxml, rw5, sdr
 
@@ -203,7 +204,11 @@ def test_the_example_comes_back(tmp_path):
         assert main(["import", str(book), "--out", str(job), "--check", "CHECK",
                      "--instrument", "TS-4"]) == 0  # fmt: skip
         volume = tankcal.run(tankcal.load(job)).at(9.0).value_m3
-        assert volume == pytest.approx(truth, rel=2e-6)
+        ppm, finer_mm = figures_of(
+            "docs/import.md", "gives its table within () ppm with readings of () mm or finer"
+        )
+        assert finer_mm == "0.1"
+        assert volume == pytest.approx(truth, rel=1e-6 * float(ppm))
 
 
 def test_the_field_book_of_the_example(tmp_path):

@@ -8,13 +8,16 @@ from statistics import NormalDist
 import pytest
 from page_figures import agree, figures_of
 from page_sessions import ROOT
+from scipy import stats
 
 from tankcal import adjust, units
+from tankcal.calibration.parameters import recommendation, significance
+from tankcal.calibration.targets import coded
 from tankcal.clouds import reading as cloud_reading
 from tankcal.clouds.formats import counted_text, decoding, e57, lines
 from tankcal.clouds.inside import bottom as cloud_bottom
 from tankcal.clouds.inside import floor_cells
-from tankcal.clouds.wall import deciding, features, growing, screens, start
+from tankcal.clouds.wall import deciding, features, growing, screens, start, unrolled
 from tankcal.geometry import patches, shell
 from tankcal.geometry.field import blunders, components, estimate, sites
 from tankcal.geometry.field.components import COMPONENTS
@@ -38,14 +41,16 @@ from tankcal.methods.liquid import columns as liquid_columns
 from tankcal.methods.liquid import facts as liquid_facts
 from tankcal.methods.strapping import tape_warnings
 from tankcal.pipeline import cluster, scanned_solids
+from tankcal.pipeline import overruling_effects as overruling
 from tankcal.pipeline.checks import wall as wall_checks
 from tankcal.pipeline.liquid import adjustment as liquid_steps
 from tankcal.pipeline.simulation import table as simulation_model
 from tankcal.pipeline.wall_straps import typical_shape_m
+from tankcal.products.fieldbooks import lists
 from tankcal.products.gauge import deviation
 from tankcal.products.gauge import reading as gauge
-from tankcal.products.inspection import boards
-from tankcal.products.linter import totals
+from tankcal.products.inspection import boards, edges, welds
+from tankcal.products.linter import pdf_text, totals
 from tankcal.products.quantity import reading as quantity
 from tankcal.products.recalibration import (
     basis,
@@ -59,7 +64,8 @@ from tankcal.report import attachments, letterhead
 from tankcal.report.inspection import paper as inspection_paper
 from tankcal.report.survey import quality
 from tankcal.report.web import calculator_data
-from tankcal.survey import strapping, untied
+from tankcal.survey import means, strapping, untied
+from tankcal.survey.diagnosis import blunders as wrong_readings
 from tankcal.tank import gauging
 from tankcal.tank.liquid import adjustment as liquid_adjustment
 from tankcal.tank.volume_correction.brazil import Brazil
@@ -87,6 +93,9 @@ BARREL_M = COMPONENT["common bulge"].median_m / math.sqrt((16 / 21) ** 2 / 5 + (
 RECALIBRATION = tomllib.loads(
     (ROOT / "tankcal/job/rule_tables/france_2020_recalibration.toml").read_text("utf-8")
 )
+SETTLEMENT = tomllib.loads(
+    (ROOT / "tankcal/products/inspection/rules/api_653.toml").read_text("utf-8")
+)["settlement"]
 HITS, TANGENTS = read_limits("wall_hits"), read_limits("tangents")
 LIQUID = tomllib.loads((ROOT / "tankcal/pipeline/liquid/limits.toml").read_text("utf-8"))["wide"]
 normal = NormalDist()
@@ -818,6 +827,171 @@ LIMITS += [
         "too large by () π s² (() even points)",
         [(24 - 3) / 24, 24],
     ),
+    (
+        "docs/adjustment.md",
+        "beyond () the observation contradicts the others (() %)",
+        [adjust.CRITICAL, PERCENT * adjust.ALPHA],
+    ),
+    (
+        "docs/adjustment.md",
+        "that the w-test detects with a probability of () %",
+        [PERCENT * adjust.POWER],
+    ),
+    (
+        "docs/adjustment.md",
+        "if more than () % of all values, or a known coordinate, were rejected, and if one known "
+        "point or photo lost far more than the others (binomial test, () %)",
+        [PERCENT * wrong_readings.MANY, PERCENT * wrong_readings.LEVEL],
+    ),
+    ("docs/adjustment.md", "agrees without them (both at () %", [PERCENT * adjust.ALPHA]),
+    ("docs/adjustment.md", "contradict each other beyond () %", [PERCENT * means.LEVEL]),
+    (
+        "docs/adjustment.md",
+        "(factor √χ²(3): (), (), () for 90, 95, 99 %; the standard ellipsoid holds () %)",
+        [*(math.sqrt(stats.chi2.ppf(p, 3)) for p in (0.9, 0.95, 0.99)), 100 * stats.chi2.cdf(1, 3)],
+    ),
+    ("docs/archive.md", "long tables of more than () MB", [attachments.LARGEST_PACKED / 1e6]),
+    ("docs/camera.md", "with () px added", [coded.SD_FLOOR_PX]),
+    ("docs/camera.md", "`--alpha` ()", [significance.ALPHA]),
+    (
+        "docs/camera.md",
+        "with a share below () % (0.7 % in print). Of the parameters that load above () on one "
+        "component, the parameter with the smallest loading is dropped. Loadings closer than ()",
+        [recommendation.NEGLIGIBLE_PERCENT, recommendation.LOADING, recommendation.ALIKE],
+    ),
+    (
+        "docs/conventions.md",
+        "leaning cylinder, band from () % to () % of the radius (() mm at least). Points more "
+        "than () mm from",
+        [
+            PERCENT * shell.WIDE_BAND,
+            PERCENT * shell.WALL_BAND,
+            MM * shell.LEAST_BAND_M,
+            MM * shell.BELIEVED_M,
+        ],
+    ),
+    (
+        "docs/conventions.md",
+        "accepted points that deviates by () mm and () standard",
+        [MM * blunders.LEAST_M, blunders.LEAST_W],
+    ),
+    ("docs/conventions.md", "rejected points within () mm that", [MM * patches.FARTHEST_M]),
+    (
+        "docs/conventions.md",
+        "with conventional weights, () % more for rho = () kg/m3",
+        [PERCENT * ((1 - 1.2 / 8000) / (850 - 1.2) * 850 - 1), 850],
+    ),
+    ("docs/import.md", "Files may have up to () MB", [lists.MAX_BYTES / 1e6]),
+    (
+        "docs/inspection-welds.md",
+        "A board of () mm (36 in) is centred",
+        [MM * boards.BOARD_M],
+    ),
+    ("docs/inspection-welds.md", "largest |g| within () mm of it", [MM * boards.REACH_M]),
+    (
+        "docs/inspection-welds.md",
+        "A peak of () mm exp(-|s|/w) has gaps of (), () and () mm for w = (), () and () m",
+        [
+            8,
+            *(8 * (1 - math.exp(-boards.BOARD_M / 2 / w)) for w in (0.1, 0.15, 0.3)),
+            0.1,
+            0.15,
+            0.3,
+        ],
+    ),
+    (
+        "docs/inspection-welds.md",
+        "are divided: () mm across the weld (up to () mm where",
+        [MM * welds.ACROSS_M, MM * welds.WIDEST_M],
+    ),
+    ("docs/inspection-welds.md", "through the cells within () mm", [MM * boards.END_M]),
+    ("docs/inspection-welds.md", "The middle () mm of a weld", [2 * MM * boards.BEAD_M]),
+    (
+        "docs/inspection-welds.md",
+        "over all boards deviates by () mm or more",
+        [MM * boards.LEAST_BEAD_M],
+    ),
+    (
+        "docs/inspection-welds.md",
+        "a hole of more than () mm near the weld, an end without wall on both sides, or a step "
+        "that no plate has (() mm from",
+        [MM * boards.HOLE_M, MM * boards.STEP_M],
+    ),
+    ("docs/inspection-welds.md", "A step of () mm or more is not", [MM * boards.STEP_M]),
+    (
+        "docs/limits.md",
+        "a bulge of () mm rms is assumed, uncertain by a factor of ()",
+        [
+            MM * COMPONENT["common bulge"].median_m,
+            math.exp(COMPONENT["common bulge"].log_sd / 2),
+        ],
+    ),
+    (
+        "docs/limits.md",
+        "farther from the wall than () % of the radius, and farther than () mm",
+        [PERCENT * shell.WALL_BAND, MM * shell.LEAST_BAND_M],
+    ),
+    (
+        "docs/limits.md",
+        "This requires a distance below () % of the radius (at least () mm)",
+        [PERCENT * shell.WALL_BAND, MM * shell.LEAST_BAND_M],
+    ),
+    ("docs/limits.md", "or a pipe within () mm of the wall", [MM * patches.FARTHEST_M]),
+    ("docs/limits.md", "or less than () mm from the wall", [MM * blunders.LEAST_M]),
+    (
+        "docs/limits.md",
+        "Clutter within () % of the radius and () mm of the wall",
+        [PERCENT * scanned_solids.NEVER_PART, MM * scanned_solids.NEVER_M],
+    ),
+    (
+        "docs/limits.md",
+        "At most () pages and () MB of drawing",
+        [pdf_text.MOST_PAGES, pdf_text.MOST_CONTENT / 1e6],
+    ),
+    (
+        "docs/planning.md",
+        "the largest undetected blunder (() %, power () %)",
+        [PERCENT * adjust.ALPHA, PERCENT * adjust.POWER],
+    ),
+    (
+        "docs/overruling.md",
+        "A kept point more than () mm from the wall that the others show, or a kept point or "
+        "reading with |w| above ()",
+        [MM * overruling.OUTRAGEOUS_M, overruling.OUTRAGEOUS],
+    ),
+    (
+        "docs/settlement.md",
+        "only if the bend is significant at () %",
+        [PERCENT * edges.ALPHA],
+    ),
+    (
+        "docs/plausibility.md",
+        "`checks.diameter_is` (() % + () mm)",
+        [PERCENT * plausibility.DRAWN_MISS, MM * plausibility.DRAWN_MISS_M],
+    ),
+    ("docs/record-format.md", "until at most () remain", [unrolled.MOST_CELLS]),
+    ("docs/settlement.md", "to be at least (); not determined", [SETTLEMENT["least_r2"]]),
+    (
+        "docs/where.md",
+        "significance level of the tests of readings** (() %, ())",
+        [PERCENT * adjust.ALPHA, adjust.CRITICAL],
+    ),
+    (
+        "docs/plausibility.md",
+        "each course, may depart by () in () and () standard uncertainties of points",
+        [*ONE_IN_500, NOMINAL["sds"]],
+    ),
+    (
+        "docs/plausibility.md",
+        "More than () % is refused",
+        [PERCENT * plausibility.IMPOSSIBLE_MISS],
+    ),
+    (
+        "docs/plausibility.md",
+        "their centres are at most () mm from the wall",
+        [plausibility.TARGET_MM["flat"][1]],
+    ),
+    ("docs/plausibility.md", "A departure within () in () is not detected", ONE_IN_500),
     ("docs/liquid-papers.md", "changes a volume by more than () U", [liquid_facts.HIDDEN_U]),
     (
         "docs/inspection.md",

@@ -5,6 +5,7 @@ import pytest
 from jacobians import assert_derivative
 from levelled_tanks import A_MM, LIMITS, TANK_A, epoch_of, even_azimuths, waves
 from numpy.testing import assert_allclose
+from page_figures import figures_of
 
 from tankcal.job.tables import Log
 from tankcal.products.inspection.levelling import Levelling, is_within_noise
@@ -110,6 +111,11 @@ def test_limits_of_example_b(count, inches):
     in_feet = Strength(272.0, 66.4, yield_pa=36e3, e_pa=30e6)
     in_si = Strength(272 * 0.3048, 66.4 * 0.3048, yield_pa=36e3 * 6894.757, e_pa=30e6 * 6894.757)
     assert_allclose(12 * limits_of_b(count, in_feet), inches, atol=0.0051)
+    printed = figures_of(
+        "docs/settlement.md",
+        "the limit is (), (), (), (), (), () in with (), (), (), (), (), () points",
+    )
+    assert float(printed[printed[6:].index(str(count))]) == inches
     assert_allclose(limits_of_b(count, in_si) / 0.0254, 12 * limits_of_b(count, in_feet), rtol=1e-9)
 
 

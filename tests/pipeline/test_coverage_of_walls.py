@@ -20,6 +20,8 @@ from tankcal.pipeline.wall.finding import find_wall
 from tankcal.tank.capacity import Capacity
 
 LEAST_HELD, LEAST_IN_CLASS = 0.94, 0.92
+# Assumed kurtosis of relative errors, which differ much between families and radii.
+KURTOSIS = 12.0
 MOST_WIDE = 1.6  # mean U over 1.96 rms errors
 ROWS, DELIVERIES, DELIVERED_M = 10, 5, 2.0
 
@@ -104,7 +106,7 @@ def assert_as_stated(parts, wide, count, stated, full):
     """Shares and ratio of `count` tanks are those of `full` tanks on a page, by sampling error."""
     *shares, ratio = stated
     assert shares_agree(parts, shares, count, full), (parts, shares)
-    assert ratios_agree(wide, ratio, count, full), (wide, ratio)
+    assert ratios_agree(wide, ratio, count, full, KURTOSIS), (wide, ratio)
 
 
 def least_in_class(walls, classes):

@@ -12,6 +12,7 @@ import pytest
 from draws import draws
 from job_builder import job_parts, write_folder
 from numpy.testing import assert_allclose
+from page_figures import figures_of, value_of
 from radii_jobs import HEIGHTS_M, RADII_M, closed_volume_m3, partial_parts, radii_parts
 
 import tankcal
@@ -52,6 +53,17 @@ def test_examples_to_the_printed_digit(given, printed):
         round(float(200 * change.mean() / 6500), 3),
     ]
     assert ours == list(printed)
+    stated = {
+        1.2: figures_of(
+            "docs/partial.md",
+            "| 0.7, 0.3 | 0.8, 0.3 | 0.4, 0.3 | +1.2 | () | () | () | () %, () % | () % |",
+        ),
+        -2.0: figures_of(
+            "docs/partial.md",
+            "| 0.7, 0.3 | 0.4, 0.6 | 0.4, 0.3 | −2.0 | () | () | () | () %, () % | () % |",
+        ),
+    }
+    assert [value_of(text) for text in stated[found]] == ours
 
 
 def test_the_third_example_is_beyond_the_limit():

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import EXAMPLE
+from page_figures import agree, figures_of
 from test_planning import PHOTOS, rough_places, rows
 
 import tankcal
@@ -83,6 +84,16 @@ def test_three_distances_suffice_two_in_a_plane_do_not(shape_sds, figure):
     upright, level = shape_sds("V1", "V3"), shape_sds("H1", "H3")
     for name, one in (("8", eight), ("H H V", three), ("V V", upright), ("H H", level)):
         figure(f"sds of height and widths, tapes {name} (mm)", np.round(one, 2))
+    printed = {
+        "eight": figures_of("docs/planning.md", "| eight | () | (), () |"),
+        "three": figures_of(
+            "docs/planning.md", "| two level, not parallel, and one upright | () | (), () |"
+        ),
+        "level": figures_of("docs/planning.md", "| two level | () | (), () |"),
+        "upright": figures_of("docs/planning.md", "| two upright | () | (), () |"),
+    }
+    for name, sds in (("eight", eight), ("three", three), ("level", level), ("upright", upright)):
+        assert agree(sds, printed[name]), name
     assert (three < 1.7 * eight).all()
     assert (upright[1:] > 1.7 * three[1:]).all()
     assert level[0] > 3 * three[0]
@@ -138,4 +149,9 @@ def test_at_least_three_rays_a_point(figure):
     free = np.array([adjusted.survey.points[i] not in held for i in points])
     mean = {n: float(table.redundancy[(count == n) & free].mean()) for n in (2, 3, 4)}
     figure("mean redundancy of image coordinates by rays", mean)
+    printed = figures_of(
+        "docs/planning.md",
+        "of an image coordinate is () with two rays, () with three, and () with four",
+    )
+    assert agree(mean.values(), printed)
     assert mean[2] < 0.26 < mean[3] < mean[4]
