@@ -26,7 +26,7 @@ from tankcal.errors import SolutionError
 from tankcal.messages import message
 
 ALPHA, POWER = 0.001, 0.80  # of the test of a single reading, and of its detectable blunder
-CRITICAL = 3.29  # critical value of the statistic: two-sided normal, ALPHA, as rounded in practice
+CRITICAL = 3.29  # two-sided normal value of ALPHA, rounded as in practice: change both together
 UNCONTROLLED = 1e-6  # redundancy number below which an observation counts as uncontrolled
 WELL_PLACED = 1e-3  # squared pivot, scaled columns: normal equations lose three of sixteen digits
 TIED = 9  # decimals of compared statistics: equal ones differ by rounding only

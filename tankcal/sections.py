@@ -408,7 +408,7 @@ def sample_of(group, xyz_m, covariance_m2, slope, z_m):
 
     Returns
     -------
-    form.Sample
+    tankcal.geometry.outlines.Sample
 
     Notes
     -----

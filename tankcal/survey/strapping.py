@@ -317,7 +317,6 @@ def reduce_strap(strap, tape, obstructions, shell_temperature_c, strapping, diam
                0.0 if on_shell else per_k * TAPE_TEMPERATURE_K / RECTANGULAR),
     )  # fmt: skip
     # Each pull is laid anew, so the variances of laying add.
-    # Each pull is laid anew, so the variances of laying add.
     variance = strap.sd_m**2 + strap.pulls * tape.laying_m**2
     variance += sum((item.count * item.sd_m) ** 2 for item in obstructions)
     return ReducedStrap(

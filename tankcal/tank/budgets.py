@@ -66,17 +66,25 @@ class Budget:
         """k times the root sum of squares of the standard uncertainties of the reading, m3."""
         return self.k * max(self.u_m3**2 - self.table_u_m3**2, 0.0) ** 0.5
 
-    def __str__(self) -> str:
+    @property
+    def volume_text(self):
+        """Dip, or dips, and volume with U in one line (str)."""
         dips = (
             f"{self.high_m:g} m" if self.low_m is None else f"{self.low_m:g} to {self.high_m:g} m"
         )
         return f"{dips}: {volume_text(self.volume_m3, self.U_m3, self.k)}"
 
+    def __str__(self) -> str:
+        lines = [
+            f"{100 * line.share:6.1f} %  {line.contribution:9.4f} m3  {self._input_text(line)}"
+            for line in self._ordered
+        ]
+        return "\n".join([self.volume_text, *lines])
+
     def __repr__(self) -> str:
-        return f"<Budget of {self}>"
+        return f"<Budget of {self.volume_text}>"
 
     def _repr_html_(self) -> str:
-        ordered = sorted(self.lines, key=lambda line: -abs(line.share))
         rows = [
             [
                 line.name + (" (default)" if line.is_default else ""),
@@ -85,9 +93,21 @@ class Budget:
                 line.contribution,
                 100 * line.share,
             ]
-            for line in ordered
+            for line in self._ordered
         ]
-        return table_html(str(self), ["input", "u", "unit", "contribution, m3", "share, %"], rows)
+        headings = ["input", "u", "unit", "contribution, m3", "share, %"]
+        return table_html(self.volume_text, headings, rows)
+
+    @property
+    def _ordered(self):
+        """Lines, largest share first."""
+        return sorted(self.lines, key=lambda line: -abs(line.share))
+
+    @staticmethod
+    def _input_text(line):
+        """Return the name of an input with its u, if it has a u of its own."""
+        u = "" if isnan(line.u) else f", u = {line.u:.3g} {line.unit}"
+        return f"{line.name}{u}{' (default)' if line.is_default else ''}"
 
 
 def reading_sources(declared, largest_interpolation_m3):
@@ -173,11 +193,13 @@ def budget(table, high_m, low_m=None, reading=(), factors=None):
     >>> table = Capacity(np.array([0, 1.0]), np.array([0, 100.0]), np.ones(2), (form,), 0.95)
     >>> print(budget(table, 0.5))
     0.5 m: 50.00 m3, U = 0.20 m3 (k = 1.96)
+     100.0 %     0.1000 m3  form
 
     What if u of the form were half as large?
 
     >>> print(budget(table, 0.5, factors=[0.5]))
     0.5 m: 50.000 m3, U = 0.098 m3 (k = 1.96)
+     100.0 %     0.0500 m3  form
     """
     quantity = table.at(high_m) if low_m is None else table.delivery(low_m, high_m)
     dips = [high_m] if low_m is None else [low_m, high_m]

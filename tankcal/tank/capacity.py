@@ -170,6 +170,35 @@ class Capacity:
         """
         return self._combined([(high_m, 1.0), (low_m, -1.0)])
 
+    def covariance_m6(self, heights_m):
+        """Return the covariance matrix of the volumes at n dips.
+
+        Parameters
+        ----------
+        heights_m : array_like, shape (n,)
+            Dips, m.
+
+        Returns
+        -------
+        ndarray, shape (n, n)
+            W F F' W', m6, with the factor F of the covariance of all rows and the weights W of the
+            rows in the volumes at the dips.
+
+        Raises
+        ------
+        HeightError
+            For a dip outside the table.
+
+        Examples
+        --------
+        >>> form = Source("form", np.array([[0.0], [0.2]]))
+        >>> table = Capacity(np.array([0, 1.0]), np.array([0, 100.0]), np.ones(2), (form,), 0.95)
+        >>> table.covariance_m6([0.5, 1.0]).round(4).tolist()
+        [[0.01, 0.02], [0.02, 0.04]]
+        """
+        factor = self.weights(heights_m) @ self.factor_m3
+        return factor @ factor.T
+
     def for_use(self, height_m):
         """Return whether the table may be used at each height."""
         height_m = np.asarray(height_m, dtype=float)

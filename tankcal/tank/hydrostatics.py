@@ -304,18 +304,18 @@ def _build_hoop(course, plate, modulus, gravity, scale, density, level):
     wet = np.clip(level - course.bottom_m, 0, height)
     depth = wet * (level - course.bottom_m - wet / 2) / height  # mean of (h_s - z)+
     soft = gravity / (modulus * plate) if plate > 0 else 0.0  # no plate: the course is unloaded
-    bulge = soft * density * depth
+    expansion = soft * density * depth
     # Positive root of B r0^2 + r0 - r = 0, in the form without cancellation for small B.
-    radius = 2 * surveyed / (1 + np.sqrt(1 + 4 * bulge * surveyed))
+    radius = 2 * surveyed / (1 + np.sqrt(1 + 4 * expansion * surveyed))
     # Implicit derivative: dr0 (1 + 2 B r0) = dr - r0^2 dB, for K = soft r0^2.
-    stiffening = 1 + 2 * bulge * radius
+    stiffening = 1 + 2 * expansion * radius
     by_soft = radius**2 / stiffening
-    by_bulge = -2 * soft * radius**3 / stiffening
+    by_expansion = -2 * soft * radius**3 / stiffening
     derivatives = {
         "youngs_modulus": -by_soft * soft / modulus,
         "plate_thickness": -by_soft * soft / plate if plate > 0 else 0.0,
-        "survey_density": by_bulge * soft * depth,
-        "survey_level": by_bulge * soft * density * wet / height,
+        "survey_density": by_expansion * soft * depth,
+        "survey_level": by_expansion * soft * density * wet / height,
         "scale": 2 * soft * radius * surveyed / stiffening,
     }
     return Hoop(course, girths, float(radius), float(soft * radius**2), derivatives)

@@ -752,6 +752,11 @@ LIMITS += [
     ),
     (
         "docs/uncertainty.md",
+        "exceeds (), its critical value at () %",
+        [adjust.CRITICAL, PERCENT * adjust.ALPHA],
+    ),
+    (
+        "docs/uncertainty.md",
         "corresponds to two seams of () mm, () m wide",
         [MM * estimate.DEPTH_M, estimate.WIDTH_M],
     ),
