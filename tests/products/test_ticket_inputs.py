@@ -245,6 +245,14 @@ def test_a_slip_that_explains_a_contradiction_is_named(slip, key):
     assert key in slips
 
 
+def test_another_base_of_the_volume_is_named_alone():
+    """Exchanged dips would give the same volume in the other direction, which explains nothing."""
+    inputs = _compared(_inputs())
+    wrong = inputs | {"product": inputs["product"] | {"base": "15C"}}
+    slips = [warning.column for warning in read_tickets(_cylinder(), wrong).warnings]
+    assert slips == ["product.base"]
+
+
 def test_a_difference_that_no_slip_explains_is_left(tmp_path):
     inputs = _compared(_inputs())
     inputs["compared"]["value"] += 50.0

@@ -12,9 +12,13 @@ from tankcal.messages import message
 from tankcal.products.quantity.results import compare
 from tankcal.products.quantity.transfer import STATES
 from tankcal.products.settings import drop_blanks
+from tankcal.tank.volume_correction.corrections import TABLE
+from tankcal.tank.volume_correction.petroleum import BASES_C
 from tankcal.tank.volume_correction.ranges import DEGREES
 
-OTHER_BASES_C = {"15C": 20.0, "20C": 15.0, "60F": 20.0}  # another customary base
+OTHER_BASES = {"15C": "20C", "20C": "15C", "60F": "20C"}  # another customary base
+
+_BOTH_DIPS = "opening.dip_m, closing.dip_m"
 
 
 def find_slips(tickets, read):
@@ -40,10 +44,12 @@ def find_slips(tickets, read):
     slips = []
     for key, text, changed in _candidates(tickets.sections, tickets.transfer.table):
         try:
-            other = _e_n(read(drop_blanks(changed)))
+            trial = read(drop_blanks(changed))
         except InputError:  # the changed ticket is impossible
             continue
-        if abs(other) <= 1:
+        other = _e_n(trial)
+        # Both dips exchanged reverse the transfer; both parties know its direction.
+        if abs(other) <= 1 and (key != _BOTH_DIPS or _direction(trial) == _direction(tickets)):
             expected = message(
                 "ticket_slip", "would explain the difference (E_n {e_n:.2f}): {slip}?", e_n=other,
                 slip=text,
@@ -60,6 +66,12 @@ def _e_n(tickets):
     return float(comparison.e_n[0])
 
 
+def _direction(tickets):
+    """Sign of the volume closing less opening; 0 for a stock."""
+    moved = tickets.quantities.get("moved")
+    return 0 if moved is None else np.sign(moved.value[0, 0])
+
+
 def _candidates(sections, table):
     """Yield (key, slip in words, sections without the slip)."""
     product, base = sections["product"], sections["product"]["base"]
@@ -68,20 +80,26 @@ def _candidates(sections, table):
             changed = _exchange_dips(sections, states)
             if changed is not None:
                 text = message("ticket_slip_ullage", "is the dip an ullage, or the ullage a dip")
-                yield f"{states[-1]}.dip_m", text, changed
+                key = _BOTH_DIPS if len(states) == len(STATES) else f"{states[0]}.dip_m"
+                yield key, text, changed
     celsius = dict(sections)
     for state in STATES:
         celsius[state] = _map(sections[state], ("temperature_c", "ambient_c"), _convert_fahrenheit)
     celsius["product"] = _map(product, ("density_temperature_c",), _convert_fahrenheit)
     fahrenheit = message("ticket_slip_fahrenheit", "are the temperatures in degrees Fahrenheit")
     yield "closing.temperature_c", fahrenheit, celsius
+    if base is not None and product["correction"] != TABLE:
+        other = OTHER_BASES[base]
+        text = message("ticket_slip_other_base", "is the other quantity at {other:g} {unit}",
+                       other=BASES_C[other], unit=DEGREES)  # fmt: skip
+        yield "product.base", text, sections | {"product": product | {"base": other}}
     if product["density_is"] == "base":
         observed = {"density_is": "observed"}
         if base is not None:
-            changed = observed | {"density_temperature_c": OTHER_BASES_C[base]}
+            changed = observed | {"density_temperature_c": BASES_C[OTHER_BASES[base]]}
             text = message(
                 "ticket_slip_base", "is the density that at {other:g} {unit}",
-                other=OTHER_BASES_C[base], unit=DEGREES,
+                other=BASES_C[OTHER_BASES[base]], unit=DEGREES,
             )  # fmt: skip
             yield "product.density_kg_m3", text, sections | {"product": product | changed}
         changed = observed | {"density_temperature_c": sections["closing"]["temperature_c"]}
