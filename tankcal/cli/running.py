@@ -3,7 +3,8 @@
 from pathlib import Path
 
 import tankcal
-from tankcal.errors import Problem, SolutionError, problem_of
+from tankcal.errors import InputError, Problem, SolutionError, problem_of
+from tankcal.job.certificate_entries import missing_entries
 from tankcal.messages import message
 from tankcal.terminal.arguments import add_letterhead, parse_cluster, read_letterhead
 from tankcal.terminal.showing import (
@@ -71,7 +72,8 @@ def _add_run(commands):
         "--strict",
         action="store_true",
         help="write no file if the global test of the adjustment fails, or if a rejected "
-        "observation may not be the blunder (exit status 3)",
+        "observation may not be the blunder (exit status 3), or if the certificate would be a "
+        "draft (exit status 2)",
     )
     papers = run.add_mutually_exclusive_group()
     add_letterhead(papers)
@@ -129,6 +131,9 @@ def _compute(
     show = Progress(quiet)
     job = read_job(source, show, only=only)
     from tankcal.report import outputs
+
+    if strict and only is None and papers[1]:
+        _refuse_draft(job, papers[0])
 
     outputs.refuse_foreign(out)
     doubts = _find_doubts(job.warnings)
@@ -267,6 +272,20 @@ def _volume_unit(name):
 
     shown = message("cubic_metres", "m3") if name == "m3" else name
     return shown, float(1 / VOLUME_UNITS_M3[name]), TABLE_DECIMALS[name]
+
+
+def _refuse_draft(job, letterhead):
+    """Raise InputError if the certificate lacks required entries."""
+    location = job.tank.details.get("location")
+    missing = missing_entries(job.certificate, location, letterhead is not None)
+    if missing:
+        text = message(
+            "strict_draft",
+            "not given: {entries}; ISO/IEC 17025, 7.8.2 and 7.8.4, requires them; no file was "
+            "written (--strict)",
+            entries=missing,
+        )
+        raise InputError(Problem("job.toml", text, column="certificate"))
 
 
 def _refuse_failed(adjustment):

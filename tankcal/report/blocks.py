@@ -175,7 +175,7 @@ def result(label, text, note=""):
     )
 
 
-def signature(labels, field=""):
+def signature(labels, field="", copy=()):
     """Empty lines for signatures, side by side, each above its label.
 
     Parameters
@@ -184,13 +184,17 @@ def signature(labels, field=""):
         Labels of the lines.
     field : str, optional
         Name of the field for an electronic signature above the last line; "": no field.
+    copy : sequence of str, optional
+        Notice and sentence in place of the lines, for a document of several parts, which is no
+        original.
 
     Returns
     -------
     Block
     """
     data = {"kind": "signature", "labels": [_text(label) for label in labels]}
-    return Block(data | ({"field": _text(field)} if field else {}))
+    data |= {"field": _text(field)} if field else {}
+    return Block(data | ({"copy": [_text(text) for text in copy]} if copy else {}))
 
 
 def hash_code(digest, text, alt):

@@ -6,6 +6,7 @@ listed as missing.
 
 from math import hypot
 
+from tankcal.job.certificate_entries import missing_entries
 from tankcal.job.plausibility_table import CODES
 from tankcal.methods.base import methods
 from tankcal.report import blocks
@@ -32,7 +33,6 @@ _CALIBRATION = (
     *("method", "standard", "procedure", "deviations", "operator", "equipment", "instruments"),
     *("traceability", "conditions", "condition_of_tank", "external_results", "customer_data"),
 )
-_ASKED_FOR = ("method", "traceability", "conditions", "condition_of_tank")
 
 
 def parties(paper):
@@ -166,10 +166,24 @@ def instruments_of(record):
     return used
 
 
+def missing_keys(paper):
+    """Return the keys of required entries that the certificate lacks (list of str)."""
+    job = paper.record["job"]
+    return missing_entries(
+        job["certificate"], job["tank"]["details"].get("location"), bool(paper.letterhead)
+    )
+
+
+def title(paper):
+    """Return the title of the certificate; it names a draft if required entries are missing."""
+    return paper.word("titles.draft" if missing_keys(paper) else "titles.certificate")
+
+
 def statements(paper):
     """List of statements: items calibrated, copies of the certificate, and missing entries."""
     certificate = paper.record["job"]["certificate"]
-    missing = [paper.label(key) for key in _ASKED_FOR if not certificate.get(key)]
+    labels = {"number": paper.word("page.number")}
+    missing = [labels.get(key) or paper.label(key) for key in missing_keys(paper)]
     rule = (paper.record.get("rule") or {}).get("rule", {})
     words = ("certificate.only_items", "texts.copy", "certificate.digits")
     sentences = [paper.word(word) for word in words]
@@ -178,6 +192,8 @@ def statements(paper):
         sentences.append(paper.word("certificate.outside_scope"))
     elif capability := find_capability(paper.letterhead, paper.record):
         sentences.append(paper.word("certificate.cmc", percent=f"{capability['percent']:g}"))
+    if certificate.get("customer_data"):
+        sentences.append(paper.word("certificate.data_of_customer"))
     if missing:
         sentences.append(paper.word("certificate.not_given", missing=", ".join(missing)))
     return blocks.listing(sentences)
@@ -191,7 +207,8 @@ def authorisation(paper):
     if name:
         person = paper.word("certificate.authorised", name=name, role=role) if role else name
     labels = [paper.label("place_and_date"), person, paper.label("signature")]
-    return blocks.signature(labels, paper.word("dcc.sign_here"))
+    copy = [paper.word(f"certificate.{key}") for key in ("copy", "original")]
+    return blocks.signature(labels, paper.word("dcc.sign_here"), copy)
 
 
 def hash_of_record(paper):

@@ -43,7 +43,23 @@ def blocks_of(notebook, part="", name="notebook"):
         raise TankcalError(f"the notebook has nothing to show that is tagged {part!r}")
     if not shown or shown[0]["kind"] != "document":
         shown.insert(0, blocks.document(title=name).data)
-    return _headings_in_steps(shown)
+    return _headings_in_steps(shown if part else _as_copy(shown))
+
+
+def _as_copy(shown):
+    """Return the blocks of a whole notebook without signature; a notice below the title says so.
+
+    Only the PDF of the certificate is signed, so that a certificate has a single original.
+    """
+    copies = [block["copy"] for block in shown if block.get("copy")]
+    notes = [
+        block.data
+        for notice, sentence in copies
+        for block in (blocks.notice(notice), blocks.paragraph(sentence))
+    ]
+    shown = [block for block in shown if not block.get("copy")]
+    place = next((i for i, block in enumerate(shown, 1) if block["kind"] == "masthead"), 1)
+    return [*shown[:place], *notes, *shown[place:]]
 
 
 def last_cell(notebook, part=""):

@@ -7,6 +7,7 @@ import pytest
 from paper_cells import of_part, paper_blocks, texts
 from test_report import pages
 
+from tankcal.job.certificate_entries import MARKED
 from tankcal.job.contract import KEYS
 from tankcal.report import blocks, certificate, field_table, sketch
 from tankcal.report.dip_point import dip_point, dip_point_text
@@ -47,8 +48,11 @@ def test_missing_entries_are_lines_to_write_on(paper):
 
 def test_entries_without_a_line_are_named_as_missing(paper):
     said = certificate.statements(paper(method="ISO 7507-3")).data["items"]
-    assert said[-1].endswith("7.8.4): Traceability, Conditions, Condition of the tank.")
-    given = dict.fromkeys(("method", "traceability", "conditions", "condition_of_tank"), "x")
+    assert said[-1].endswith(
+        "7.8.4): Certificate No., Laboratory, Address, Customer, Address of the customer, Date of "
+        "issue, Traceability, Conditions, Condition of the tank, Authorised by (name, function)."
+    )
+    given = dict.fromkeys(MARKED, "x")
     assert len(certificate.statements(paper(**given)).data["items"]) == 3
 
 

@@ -5,6 +5,7 @@ import io
 
 import xlsxwriter
 
+from tankcal.job.certificate_entries import MARKED
 from tankcal.job.sheets import SECTION
 from tankcal.job.starter.examples import EXAMPLES_OF_KEYS
 from tankcal.job.starter.look import LINE_PT, Look, lines_of, print_on_a4
@@ -133,7 +134,8 @@ def _sections(form, texts):
                     field,
                     texts.note("keys", section, field),
                     form.start(section, field),
-                    form.is_to_fill_in(section, field),
+                    form.is_to_fill_in(section, field)
+                    or (section == "certificate" and field.name in MARKED),
                     EXAMPLES_OF_KEYS.get(f"{section}.{field.name}"),
                 )
                 for field in fields

@@ -4,12 +4,12 @@ import numpy as np
 
 from tankcal.errors import Problem, SolutionError
 from tankcal.geometry.shell import VAGUE_TILT
+from tankcal.job.certificate_entries import missing_entries
 from tankcal.job.plausibility import VOLUME_MISS
 from tankcal.messages import list_some, message
 from tankcal.tank.body import OWN_SCALE
 
 SHOWN = 5  # names listed in a message
-CERTIFICATE_NEEDS = ("number", "laboratory", "customer", "method")
 LARGE_NOISE_M = 0.010  # median standard deviation in plan that causes a warning
 CONFIRMED = 0.5  # least ratio of scatter and stated standard deviation, either way, to agree
 VAGUE = 5.0  # standard deviation of a poorly determined point, relative to the median
@@ -224,12 +224,13 @@ def warn_of_undeclared(undeclared):
 
 def incomplete_certificate(job):
     """Warning that names the missing entries of a certificate."""
-    missing = [key for key in CERTIFICATE_NEEDS if not job.certificate.get(key)]
+    missing = missing_entries(job.certificate, job.tank.details.get("location"))
     if not missing:
         return ()
     text = message(
         "certificate_incomplete",
-        "not given: {entries}; ISO/IEC 17025, 7.8.2, requires them",
+        "not given: {entries}; ISO/IEC 17025, 7.8.2 and 7.8.4, requires them: the certificate is a"
+        " draft",
         entries=missing,
     )
     return (Problem("job.toml", text, column="certificate"),)
