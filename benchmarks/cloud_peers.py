@@ -15,7 +15,7 @@ from measured import ROUNDS, Row, digits_of, interleaved, peer_module, tell
 
 from tankcal.clouds.wall import sum_cells
 from tankcal.clouds.wall.cells import CellGrid
-from tankcal.clouds.wall.surfaces import CylinderSurface
+from tankcal.clouds.wall.start import CylinderSurface
 
 RADIUS_M, HEIGHT_M, NOISE_M, PIECE = 6.5, 9.5, 0.002, 1 << 18
 SAMPLED_RINGS = 5

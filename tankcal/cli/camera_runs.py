@@ -55,7 +55,7 @@ def compare(options):
     from tankcal.calibration.stability.comparison import compare as compare_calibrations
     from tankcal.calibration.stability.fits import parse_grid, parse_terrain
     from tankcal.job.calibrations import choose, read_cameras, with_pixels
-    from tankcal.record.camera_stability import plain_stability, summary
+    from tankcal.record.camera_analyses import plain_stability, summary
 
     show = _start(options)
     warnings = []
@@ -83,7 +83,7 @@ def influence(options):
     prepare_for_small_work()
     from tankcal.calibration.influence.runs import influence as compute_influence
     from tankcal.job.calibrations import read_cameras
-    from tankcal.record.camera_influence import plain_influence
+    from tankcal.record.camera_analyses import plain_influence
 
     show = _start(options)
     warnings = []
@@ -107,7 +107,7 @@ def check(options):
     from tankcal.calibration.product import limits
     from tankcal.calibration.product.check import check_product
     from tankcal.calibration.product.differences import collect_differences, read_differences
-    from tankcal.record.camera_product import plain_product
+    from tankcal.record.camera_analyses import plain_product
 
     show = _start(options)
     table = limits.read_limits(options.limits) if options.limits else limits.shipped_limits()

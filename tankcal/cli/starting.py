@@ -53,7 +53,7 @@ def add(commands):
 
 
 def _refuse_other_survey(kind, survey, language):
-    from tankcal.job.starter.form import Form
+    from tankcal.job.starter.writing import Form
 
     try:
         Form(kind, survey, language)

@@ -10,7 +10,7 @@ from tankcal.job.checks.extent import has_survey, is_sighted, is_strapped
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.entries import ColumnValues, kind_of, read_columns, read_register, read_settings
 from tankcal.job.equipment import add_shared_register, equipment_used
-from tankcal.job.model.overrulings import Overruling
+from tankcal.job.model.settings import Overruling
 from tankcal.job.rule_files import find_rule
 from tankcal.job.tables import (
     REGISTERS,

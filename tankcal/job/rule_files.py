@@ -99,7 +99,7 @@ class RuleFiles:
     example : str
         A section, for the message about a file without limits.
     has_names : bool
-        Whether the sections are [SECTION.NAME], so that one kind of limit may occur repeatedly.
+        Whether the sections are [SECTION.NAME], so that a kind of limit may occur repeatedly.
     check : callable, optional
         check(file, part, section, values, given, row, log) reports contradictions in a section.
     """

@@ -56,19 +56,14 @@ class Cameras(Product):
         }
 
     def saved_types(self):
-        from tankcal.record import (
-            camera_influence,
-            camera_parameters,
-            camera_product,
-            camera_stability,
-        )
+        from tankcal.record import camera_analyses, camera_parameters
         from tankcal.record.camera_versions import CAMERA
 
         return (
-            (CAMERA, "stability", camera_stability.StabilityFile),
+            (CAMERA, "stability", camera_analyses.StabilityFile),
             (CAMERA, "parameters", camera_parameters.ParametersFile),
-            (CAMERA, "influence", camera_influence.InfluenceFile),
-            (CAMERA, "product", camera_product.ProductFile),
+            (CAMERA, "influence", camera_analyses.InfluenceFile),
+            (CAMERA, "product", camera_analyses.ProductFile),
         )
 
 

@@ -1,6 +1,7 @@
 """The whole record: its keys, and their values from a result."""
 
 import platform
+from math import degrees
 
 import numpy as np
 import scipy
@@ -18,18 +19,241 @@ from tankcal.job.model.settings import (
     TableSpec,
     Tank,
 )
-from tankcal.methods.base import find_method, methods
+from tankcal.methods.base import find_method, given_methods, methods
 from tankcal.pipeline.tanks.corrections import Correction
-from tankcal.record import survey, table, tank_parts, texts
+from tankcal.record import survey, table, texts
 from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
 from tankcal.record.choices import Choice, adjustment_choices, choices_of
 from tankcal.record.long_tables import LongTables
-from tankcal.record.schema import Saved, fill_from, key, to_plain
-from tankcal.record.ship import ShipRecord, ship_of
+from tankcal.record.schema import Finite, Saved, fill_from, key, to_plain
 from tankcal.record.versions import FORMAT
 from tankcal.record.wall_shape import WallShapeRecord, shape_record
 from tankcal.tank.deliveries import WorstDeliveries
+from tankcal.tank.heads import torispherical_radii
 from tankcal.version import find_version
+
+# ---- the part of the record on a ship: its sounding pipe, and corrections for trim and list
+
+
+class CorrectionsOfCell(Saved):
+    """Corrections of all soundings at one trim and list."""
+
+    trim_m: Finite = key("draught aft less draught forward")
+    list_deg: Finite = key("to starboard positive")
+    dry_m3: Finite = key("volume at which the pipe becomes dry")
+    full_m: Finite = key("sounding at which the tank becomes full")
+    state: list[str] = key('"", "full": tank full; "below": less than the lowest row of the table')
+    correction_m: list[float] = key("to be added to the sounding; null: none")
+    u_correction_m: list[float] = key("standard uncertainty")
+    U_correction_m: list[float] = key("expanded uncertainty")
+    volume_m3: list[Finite] = key("of the tank at this trim and list")
+    u_m3: list[float] = key("its standard uncertainty; null: tank full")
+    U_m3: list[float] = key("expanded uncertainty")
+
+
+class ShipRecord(Saved):
+    """Sounding pipe of a tank of a ship, and corrections of soundings."""
+
+    length_between_marks_m: Finite = key("length to which trims refer")
+    bow_azimuth_deg: Finite = key("in the frame of the mesh, clockwise from +y")
+    pipe_bottom_m: list[Finite] = key("x, y, z of the lower end in the frame of the mesh")
+    pipe_top_m: list[Finite] = key("x, y, z of the upper end")
+    contraction_percent: float | None = key("of all lengths in service; null: not given")
+    interpolated_m: Finite = key("largest error of a correction half way between two soundings")
+    trim_m: list[Finite] = key("ascending")
+    list_deg: list[Finite] = key("ascending")
+    sounding_m: list[Finite] = key("along the pipe from its lower end")
+    cells: list[CorrectionsOfCell] = key("of each trim with each list, the list changing first")
+
+
+def ship_of(result):
+    """Return the `ShipRecord` of a result; None for a tank that is not on a ship."""
+    ship, tables = result.job.ship, result.ship
+    if tables is None:
+        return None
+    return ShipRecord(
+        ship.length_between_marks_m,
+        degrees(ship.bow_azimuth_rad),
+        list(ship.pipe_bottom_m),
+        list(ship.pipe_top_m),
+        None if ship.contraction is None else 100 * ship.contraction,
+        tables.interpolated_m,
+        tables.trim_m,
+        np.degrees(tables.list_rad).round(9),
+        tables.sounding_m,
+        [_cell(tables, *place) for place in np.ndindex(tables.dry_m3.shape)],
+    )
+
+
+def _cell(tables, trim, list_):
+    cell = trim, list_
+    return CorrectionsOfCell(
+        tables.trim_m[trim],
+        float(np.degrees(tables.list_rad[list_]).round(9)),
+        tables.dry_m3[cell],
+        tables.full_m[cell],
+        tables.state[cell].tolist(),
+        tables.correction_m[cell],
+        tables.u_correction_m[cell],
+        tables.U_correction_m[cell],
+        tables.volume_m3[cell],
+        tables.u_m3[cell],
+        tables.U_m3[cell],
+    )
+
+
+# ---- the parts of a tank in the record: solid, bottom, top and floating roof
+
+
+class Detail(Saved):
+    """A size or another property of a part."""
+
+    code: str = key("of the property")
+    value: str | float = key("a text if unit is null, else a number in SI")
+    unit: str | None = key("in which it is shown")
+
+
+def list_details(**values):
+    """Return the `Detail` of each code=(value, unit) whose value is not None."""
+    return [
+        Detail(code, value, unit) for code, (value, unit) in values.items() if value is not None
+    ]
+
+
+def bottom_of(result):
+    """Return the details of the bottom of an upright tank; None for a flat bottom."""
+    job = result.job
+    bottom = job.bottom
+    if job.tank.kind != "vertical" or bottom.form == "flat" or not job.switches.bottom:
+        return None
+    depth = None if bottom.centre_z_m is None else job.datum.bottom_z_m - bottom.centre_z_m
+    if bottom.form == "torispherical" and depth is None:
+        depth = -result.body.lowest_m
+    surveyed = None if bottom.xyz_m is None else len(bottom.xyz_m)
+    levels = None if bottom.level_m is None else len(bottom.level_m)
+    return list_details(
+        bottom_form=(bottom.form, None),
+        bottom_depth=(depth, "m"),
+        bottom_dish_radius=(bottom.dish_radius_m, "m"),
+        bottom_knuckle_radius=(bottom.knuckle_radius_m, "m"),
+        bottom_standard=(bottom.standard, None),
+        bottom_points=(surveyed, ""),
+        bottom_levels=(levels, ""),
+        bottom_lowest=(result.body.lowest_m - result.zero_m, "m"),
+    )
+
+
+def top_of(result):
+    """Return the details of the head on an upright tank; None without head."""
+    top = result.job.top
+    if top is None or not result.job.switches.top:
+        return None
+    body = result.body
+    return list_details(
+        top_form=(top.form, None),
+        top_depth=(body.highest_m - body.shell.volume.height_m, "m"),
+        top_dish_radius=(top.dish_radius_m, "m"),
+        top_knuckle_radius=(top.knuckle_radius_m, "m"),
+        top_standard=(top.standard, None),
+        top_capacity=(_correction_m3(result, "top"), "m3"),
+    )
+
+
+def roof_of(result):
+    """Return the details of the floating roof; None without roof."""
+    roof = result.job.roof
+    if roof is None:
+        return None
+    return list_details(
+        roof_mass=(roof.mass_kg, "kg"),
+        roof_weighing=(roof.weighing, None),
+        roof_reference_density=(roof.reference_density_kg_m3, "kg/m3"),
+        roof_displacement=(-_correction_m3(result, "roof"), "m3"),
+        roof_critical_bottom=(roof.critical_bottom_m, "m"),
+        roof_critical_top=(roof.critical_top_m, "m"),
+    )
+
+
+def _correction_m3(result, code):
+    return next(item.size_m3 for item in result.corrections if item.code == code)
+
+
+def solid_of(result):
+    """Return the inside dimensions of a tank without courses; None for a shell of courses."""
+    job = result.job
+    if job.horizontal is not None:
+        return _horizontal_details(result)
+    if job.sphere is not None:
+        return list_details(
+            diameter=(result.body.parts[0].solid.diameter_m, "m"),
+            **_scan_details(result),
+            **_sizes_by_methods(result),
+            full_capacity=(result.body.parts[0].capacity_m3, "m3"),
+        )
+    if job.mesh is not None:
+        return list_details(
+            mesh_file=(job.mesh.file, None),
+            mesh_faces=(result.body.parts[0].solid.face_count, ""),
+            full_capacity=(result.body.parts[0].capacity_m3, "m3"),
+        )
+    return None
+
+
+def _sizes_by_methods(result):
+    """Sizes as surveyed by the methods of the job: {name: (value, unit)}."""
+    sizes = {}
+    for method in given_methods(result.job):
+        sizes |= method.sizes(result)
+    return sizes
+
+
+def _horizontal_details(result):
+    lying, tank = result.job.horizontal, result.body.parts[0].solid
+    ends = {}
+    for name, end in (("a", tank.end_a), ("b", tank.end_b)):
+        ends[f"end_{name}"] = (end.kind, None)
+        dish, knuckle = end.dish_radius_m, end.knuckle_radius_m
+        if end.kind == "torispherical":
+            dish, knuckle = torispherical_radii(tank.height_m / 2, end.depth_m, dish, knuckle)
+        ends[f"end_{name}_depth"] = (end.depth_m or None, "m")
+        ends[f"end_{name}_dish_radius"] = (dish, "m")
+        ends[f"end_{name}_knuckle_radius"] = (knuckle, "m")
+    return list_details(
+        section_width=(tank.width_m, "m"),
+        section_height=(tank.height_m, "m"),
+        cylinder_length=(tank.length_m, "m"),
+        **ends,
+        axis_tilt=(tank.tilt, "mm/m"),
+        roll=(degrees(lying.roll_rad), "deg"),
+        dip_from_a=(tank.dip_from_a_m, "m"),
+        dip_direction=(tank.dip_direction, None),
+        tube_angle=(lying.tube_angle_rad and degrees(lying.tube_angle_rad), "deg"),
+        tube_offset=(lying.tube_offset_m and tank.tube_offset_m, "m"),
+        **_scan_details(result),
+        full_capacity=(result.body.parts[0].capacity_m3, "m3"),
+        **(_unmeasured_volumes(tank, result.zero_m) if result.job.rings else {}),
+    )
+
+
+def _unmeasured_volumes(tank, zero_m):
+    """Return the volumes below dip 0 and above the highest dip, which no dip measures."""
+    below = float(tank.volume_m3([zero_m])[0])
+    return {"below_zero": (below, "m3"), "left_at_full": (tank.left_m3, "m3")}
+
+
+def _scan_details(result):
+    """Return the number of points and their scatter; {} without points."""
+    scan = result.scan
+    if scan is None:
+        return {}
+    return {
+        "points_surveyed": (len(scan.residuals_m), ""),
+        "points_accepted": (len(scan.accepted), ""),
+        "wall_noise": (scan.noise_m, "mm"),
+    }
+
+
+# ---- the whole record: its keys, and their values from a result
 
 
 class Versions(Saved):
@@ -113,15 +337,13 @@ class Record(Saved, kw_only=True):
     densities: list[table.VolumesOfDensity] = key("further densities of the liquid", default=())
     gross: table.GrossShell | None = key("null for a tank without courses", default=None)
     corrections: list[Correction] = key("that apply to the job, in their order", default=())
-    solid: list[tank_parts.Detail] | None = key("sizes of a tank without courses", default=None)
-    bottom: list[tank_parts.Detail] | None = key(
-        "of the calculation; null: it is flat", default=None
-    )
-    top: list[tank_parts.Detail] | None = key(
+    solid: list[Detail] | None = key("sizes of a tank without courses", default=None)
+    bottom: list[Detail] | None = key("of the calculation; null: it is flat", default=None)
+    top: list[Detail] | None = key(
         "the head on top; left out if there is none", default=None, optional=True
     )
     deadwood: list[Deadwood] = key("as declared, also if switched off", default=())
-    roof: list[tank_parts.Detail] | None = key("the floating roof", default=None)
+    roof: list[Detail] | None = key("the floating roof", default=None)
     budget: list[table.BudgetLine] = key("of the top row, of the table alone", default=())
     choices: list[Choice] = key("all assumptions")
     warnings: list[texts.WarningRecord] = key("problems that did not stop the job")
@@ -172,11 +394,11 @@ def record_of(result):
             densities=table.densities_of(result),
             gross=table.gross_of(result),
             corrections=result.corrections,
-            solid=tank_parts.solid_of(result),
-            bottom=tank_parts.bottom_of(result),
-            top=tank_parts.top_of(result),
+            solid=solid_of(result),
+            bottom=bottom_of(result),
+            top=top_of(result),
             deadwood=job.deadwood,
-            roof=tank_parts.roof_of(result),
+            roof=roof_of(result),
             budget=table.budget_of(result),
             choices=choices_of(result),
             warnings=texts.warnings_of(result.warnings),

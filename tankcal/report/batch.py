@@ -1,6 +1,6 @@
 """Summary of a batch as JSON, CSV, workbook and web page.
 
-All values come from the rows of `tankcal.products.batch.summary`; no number is computed here.
+All values come from the rows of `tankcal.products.batch.running`; no number is computed here.
 """
 
 import json

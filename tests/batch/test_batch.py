@@ -18,7 +18,7 @@ from conftest import EXAMPLE
 from tankcal.cli import main
 from tankcal.products.batch import journal, running, steps
 from tankcal.products.batch.options import Options
-from tankcal.products.batch.summary import find_changes
+from tankcal.products.batch.running import find_changes
 
 pytestmark = pytest.mark.slow  # seconds of runs and papers
 
@@ -229,16 +229,16 @@ def test_a_full_disk_stops_in_one_line(tmp_path, monkeypatch, capsys):
 
 
 def test_input_that_cannot_be_read(two, monkeypatch, capsys):
-    from tankcal.products.batch import fingerprints
+    from tankcal.products.batch import journal
 
-    digest = fingerprints._digest
+    digest = journal._digest
 
     def refuse(path):
         if "T-0" in str(path):
             raise PermissionError(errno.EACCES, "Permission denied", str(path))
         return digest(path)
 
-    monkeypatch.setattr(fingerprints, "_digest", refuse)
+    monkeypatch.setattr(journal, "_digest", refuse)
     assert again(two) == 2
     (line,) = errors(capsys)
     assert "T-0" in line

@@ -14,7 +14,7 @@ from paper_cells import blocks_of_cells
 from tankcal.calibration.product.limits import read_limits, shipped_limits
 from tankcal.calibration.stability.comparison import compare
 from tankcal.errors import TankcalError
-from tankcal.record import camera_stability as stability_json
+from tankcal.record import camera_analyses as stability_json
 from tankcal.record.camera_versions import KINDS
 from tankcal.report import camera as camera_papers
 from tankcal.report.camera import paper as papers

@@ -15,8 +15,8 @@ from tankcal.calibration.product.limits import shipped_limits
 from tankcal.calibration.stability.comparison import compare
 from tankcal.camera.model import Form, distort_image_points
 from tankcal.errors import InputError
-from tankcal.record import camera_product as product_json
-from tankcal.record import camera_stability as stability_json
+from tankcal.record import camera_analyses as product_json
+from tankcal.record import camera_analyses as stability_json
 from tankcal.report import camera as camera_papers
 from tankcal.report.camera.paper import CameraPaper, load, number_names, shorten
 from tankcal.report.numbers import concise

@@ -13,7 +13,7 @@ from tankcal.calibration.product.check import check_product, chi2_limit, t_limit
 from tankcal.calibration.product.differences import collect_differences, read_differences
 from tankcal.calibration.product.limits import Limit, LimitTable, read_limits, shipped_limits
 from tankcal.errors import InputError
-from tankcal.record.camera_product import plain_product
+from tankcal.record.camera_analyses import plain_product
 from tankcal.record.camera_versions import FORMAT
 from tankcal.survey.results import CheckPoints
 

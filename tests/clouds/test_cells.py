@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from tankcal.clouds.wall.cells import CellGrid, WallCells
 from tankcal.clouds.wall.passes import PointSample
-from tankcal.clouds.wall.surfaces import CylinderSurface, SphereSurface
+from tankcal.clouds.wall.start import CylinderSurface, SphereSurface
 
 UPRIGHT = CylinderSurface(np.array([500.0, -20.0, 3.0]), 5.0, (0.004, -0.002))
 LYING = CylinderSurface(

@@ -12,7 +12,7 @@ from tankcal.clouds.inside import bottom_points, find_cloud_bottom, find_things
 from tankcal.clouds.inside.bottom import find_bottom_in_cells
 from tankcal.clouds.inside.floor_cells import FloorCells, floor_grid
 from tankcal.clouds.wall import find_cloud_wall
-from tankcal.clouds.wall.surfaces import CylinderSurface
+from tankcal.clouds.wall.start import CylinderSurface
 from tankcal.errors import InputError
 from tankcal.tank.bottoms import surveyed_bottom
 from tankcal.tank.terrain import Footprint

@@ -8,10 +8,10 @@ from page_figures import figures_of
 
 from tankcal.clouds.wall import find_cloud_wall, readings_of
 from tankcal.clouds.wall.cells import WallCells
-from tankcal.clouds.wall.finding import decide_wall, make_grid
 from tankcal.clouds.wall.growing import OBSTRUCTED, find_off_trend, grow_wall
 from tankcal.clouds.wall.growing import WALL as IS_WALL
-from tankcal.clouds.wall.surfaces import CylinderSurface
+from tankcal.clouds.wall.passes import decide_wall, make_grid
+from tankcal.clouds.wall.start import CylinderSurface
 from tankcal.errors import InputError
 
 JOINTS = np.array([0.0, 2.0, 4.0])

@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose
 from written_clouds import some_wall, with_checksums, with_xml, write_cloud, write_e57, write_las
 
 from tankcal.clouds import describe_cloud, read_cloud
-from tankcal.clouds.formats import decoding, files, isolation
+from tankcal.clouds.formats import files, isolation
 from tankcal.errors import InputError
 
 COUNT = 1000
@@ -299,4 +299,4 @@ def test_a_device_is_no_file(tmp_path):
 
 def test_limits_are_generous():
     """A chunk of a million points takes the child about half a second of processor."""
-    assert decoding.LEAST_CPU_S + decoding.CPU_S_OF_MILLION > 30
+    assert isolation.LEAST_CPU_S + isolation.CPU_S_OF_MILLION > 30

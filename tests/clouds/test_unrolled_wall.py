@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tankcal.clouds.wall.cells import CellGrid
-from tankcal.clouds.wall.unrolled import unroll_wall
+from tankcal.clouds.wall.readings import unroll_wall
 
 
 def make_wall(radius_m, joints_m, sides=("inside",)):

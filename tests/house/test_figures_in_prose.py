@@ -14,7 +14,7 @@ from radii_jobs import HEIGHTS_M, RADII_M, radii_parts
 import tankcal
 from tankcal.cli import main
 from tankcal.geometry.girth import perimeter_excess
-from tankcal.job.checks.obstructions import DEEPEST
+from tankcal.job.checks.tapes import DEEPEST
 from tankcal.methods.rings.wall import UPRIGHT_M
 from tankcal.tank.lying import RingedTank
 

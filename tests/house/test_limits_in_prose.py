@@ -23,7 +23,7 @@ from tankcal.geometry.field import blunders, components, estimate, sites
 from tankcal.geometry.field.components import COMPONENTS
 from tankcal.geometry.field.places import OF_CYLINDERS, OF_GREAT_CIRCLES, OF_SPHERES
 from tankcal.job import plausibility
-from tankcal.job.checks import obstructions, tiny_sds
+from tankcal.job.checks import settings, tapes
 from tankcal.job.checks.settings import MAX_TABLE_ROWS
 from tankcal.job.checks.survey import instruments
 from tankcal.job.contract import ranging
@@ -35,7 +35,7 @@ from tankcal.methods.great_circles import sphere as circles
 from tankcal.methods.hits import wall as hits_wall
 from tankcal.methods.hits import warnings as hits_warnings
 from tankcal.methods.inside_hits import solid as inside_solid
-from tankcal.methods.lines import departures
+from tankcal.methods.lines import warnings
 from tankcal.methods.lines import warnings as lines_warnings
 from tankcal.methods.liquid import columns as liquid_columns
 from tankcal.methods.liquid import facts as liquid_facts
@@ -173,7 +173,7 @@ LIMITS = [
     (
         "docs/strapping.md",
         "an `s_mm` below () mm, which is probably in metres (below () mm it asks",
-        [tiny_sds.SURE["s_mm"], tiny_sds.LEAST["s_mm"]],
+        [settings.SURE["s_mm"], settings.LEAST["s_mm"]],
     ),
     (
         "docs/strapping.md",
@@ -209,9 +209,9 @@ LIMITS = [
     (
         "docs/strapping.md",
         "more butt straps, laps or welds than one per () m",
-        [obstructions.LEAST_PLATE_M],
+        [tapes.LEAST_PLATE_M],
     ),
-    ("docs/strapping.md", "and caps over () mm", [obstructions.THICK_WELD_MM]),
+    ("docs/strapping.md", "and caps over () mm", [tapes.THICK_WELD_MM]),
     (
         "docs/strapping.md",
         "than chance explains (under () %)",
@@ -236,7 +236,7 @@ LIMITS = [
     (
         "docs/wall-hits.md",
         "an `s_mm` or `s_arcsec` below (), which is probably in metres or degrees (below () it",
-        [tiny_sds.SURE["s_arcsec"], tiny_sds.LEAST["s_arcsec"]],
+        [settings.SURE["s_arcsec"], settings.LEAST["s_arcsec"]],
     ),
     (
         "docs/wall-hits.md",
@@ -307,7 +307,7 @@ LIMITS = [
     (
         "docs/tangents.md",
         "an `s_arcsec` below (), which is probably in degrees (below () it asks",
-        [tiny_sds.SURE["s_arcsec"], tiny_sds.LEAST["s_arcsec"]],
+        [settings.SURE["s_arcsec"], settings.LEAST["s_arcsec"]],
     ),
     (
         "docs/tangents.md",
@@ -376,7 +376,7 @@ LIMITS = [
     (
         "docs/reference-lines.md",
         "asks about an `s_mm` below () mm and refuses an `s_mm` below () mm",
-        [tiny_sds.LEAST["s_mm"], tiny_sds.SURE["s_mm"]],
+        [settings.LEAST["s_mm"], settings.SURE["s_mm"]],
     ),
     (
         "docs/reference-lines.md",
@@ -388,12 +388,12 @@ LIMITS = [
     (
         "docs/reference-lines.md",
         "of all others by over () mm and by five times",
-        [MM * departures.APART_M],
+        [MM * warnings.APART_M],
     ),
     (
         "docs/reference-lines.md",
         "by () standard deviations less than all of them",
-        [departures.SURE_SDS],
+        [warnings.SURE_SDS],
     ),
     (
         "docs/reference-lines.md",

@@ -16,14 +16,18 @@ from tankcal.products.inspection.out_of_plane import (
     r_squared,
     select_subset,
 )
-from tankcal.products.inspection.rules import SettlementLimits, Strength, compute_curvature_limit
+from tankcal.products.inspection.rules import (
+    SettlementLimits,
+    Strength,
+    compute_curvature_limit,
+    make_check,
+)
 from tankcal.products.inspection.settlement import (
     assess,
     assess_settlement,
     make_settlement,
     settlement_figures,
 )
-from tankcal.products.inspection.verdict import make_check
 
 
 def figures(epoch, strength, limits=LIMITS, dof=np.inf):

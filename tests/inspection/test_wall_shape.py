@@ -11,9 +11,8 @@ from inspected_walls import cylinder, true_level, true_plumb
 from tankcal.gum.conformity import verdict_of
 from tankcal.pipeline.wall.finding import find_wall
 from tankcal.pipeline.wall.shape import LOW_M, wall_shape_of
-from tankcal.products.inspection.rules import limit_of, shipped_names, shipped_rule
+from tankcal.products.inspection.rules import limit_of, make_check, shipped_names, shipped_rule
 from tankcal.products.inspection.shape import Sizes, inspect_shape, spread_of
-from tankcal.products.inspection.verdict import make_check
 from tankcal.record.schema import to_plain
 from tankcal.record.wall_shape import shape_record
 

@@ -10,7 +10,7 @@ from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.job.contract import COLUMNS
 from tankcal.job.starter import write_form, write_input_workbook, write_starter
-from tankcal.job.starter.form import Form
+from tankcal.job.starter.writing import Form
 from tankcal.products.batch.finding import find_jobs
 from tankcal.products.batch.options import Options
 from tankcal.report.folders import default_folder

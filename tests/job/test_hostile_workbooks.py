@@ -15,7 +15,7 @@ from job_builder import job_parts, write_book
 from spoilt import problems_of
 
 from tankcal.job.excel import MAX_COLUMNS, Unreadable, archive, column_letters, read_sheets
-from tankcal.job.excel.markup import parse
+from tankcal.job.excel.archive import parse
 
 SHEET, STRINGS = "xl/worksheets/sheet2.xml", "xl/sharedStrings.xml"
 SECONDS, BYTES = 40.0, 150_000_000  # openpyxl's; ours takes one to three seconds

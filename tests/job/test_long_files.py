@@ -13,9 +13,9 @@ from tankcal.errors import InputError
 from tankcal.job import folder
 from tankcal.job.tables import MAX_COLUMNS, MAX_LINES, Log
 from tankcal.products.fieldbooks.detection import read_book
-from tankcal.products.linter import grids, pdf_text
+from tankcal.products.linter import grids
+from tankcal.products.linter.grids import MOST_CONTENT
 from tankcal.products.linter.linting import lint
-from tankcal.products.linter.pdf_text import MOST_CONTENT
 
 
 @pytest.fixture
@@ -119,7 +119,7 @@ def test_prose_is_no_heading(monkeypatch):
 
 @pytest.mark.slow
 def test_pages_that_take_too_long(tmp_path, monkeypatch):
-    monkeypatch.setattr(pdf_text, "MOST_SECONDS", 1)
+    monkeypatch.setattr(grids, "MOST_SECONDS", 1)
     path = tmp_path / "old.pdf"
     write_pdf(path, 20, b"BT /F1 8 Tf\n" + b"1 0 0 1 20 700 Tm (7) Tj\n" * 4000 + b"ET")
     expected = "old.pdf: not read within 1 seconds; expected only the pages of the table"

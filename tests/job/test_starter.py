@@ -26,8 +26,8 @@ from tankcal.job.contract import (
 from tankcal.job.fields import Field
 from tankcal.job.rule_files import LIMITS, RULE, parse_rule, shipped_names
 from tankcal.job.starter import write_input_workbook, write_starter
-from tankcal.job.starter.form import OF_GREAT_CIRCLES, STRAPPED
 from tankcal.job.starter.page import filled_page
+from tankcal.job.starter.writing import OF_GREAT_CIRCLES, STRAPPED
 from tankcal.job.tables import Log
 from tankcal.tank.rules import TANKS
 from tankcal.text.shipped import DEFAULT, LANGUAGES

@@ -25,7 +25,7 @@ from tankcal.clouds import describe_cloud
 from tankcal.clouds.inside.floor_cells import FloorCells, floor_grid, sum_floor_cells
 from tankcal.clouds.inside.things import ThingCells, sample_things
 from tankcal.clouds.wall.cells import SUMMED, CellGrid
-from tankcal.clouds.wall.surfaces import CylinderSurface
+from tankcal.clouds.wall.start import CylinderSurface
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.methods.clouds import wall as cloud_wall

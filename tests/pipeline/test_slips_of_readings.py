@@ -12,7 +12,7 @@ from test_slips_of_crews import book_of, computed
 
 import tankcal
 from tankcal.errors import InputError
-from tankcal.job.checks.survey.angle_units import chance_of_packed
+from tankcal.job.checks.survey.doubtful import chance_of_packed
 from tankcal.methods.hits.wall import (
     _refuse_stations_outside,
     refuse_misread_lines,

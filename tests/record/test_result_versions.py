@@ -10,7 +10,7 @@ from schemas import SAVED, keys_in, keys_of_schema
 from tankcal.calibration.product.check import check_product
 from tankcal.errors import InputError
 from tankcal.planning import load_plan, predict
-from tankcal.record.camera_product import plain_product
+from tankcal.record.camera_analyses import plain_product
 from tankcal.record.camera_versions import CAMERA
 from tankcal.record.plan import PLAN, plain_of
 from tankcal.record.schema import check_data, from_plain, to_plain

@@ -14,10 +14,10 @@ from tankcal.calibration.parameters.analysis import analyse_job
 from tankcal.calibration.product.check import check_product
 from tankcal.calibration.product.limits import shipped_limits
 from tankcal.calibration.stability.comparison import compare
-from tankcal.record import camera_influence as influence_json
+from tankcal.record import camera_analyses as influence_json
+from tankcal.record import camera_analyses as product_json
+from tankcal.record import camera_analyses as stability_json
 from tankcal.record import camera_parameters as parameters_json
-from tankcal.record import camera_product as product_json
-from tankcal.record import camera_stability as stability_json
 from tankcal.survey.measurements import AdjustmentSettings, Instrument
 
 CONTROL = tuple(f"P{i}" for i in range(1, 48, 6))

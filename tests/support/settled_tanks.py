@@ -14,9 +14,8 @@ import numpy as np
 from levelled_tanks import LIMITS, epoch_of, even_azimuths
 
 from tankcal.products.inspection.out_of_plane import find_neighbours, fit_plane, r_squared
-from tankcal.products.inspection.rules import SettlementLimits, Strength
+from tankcal.products.inspection.rules import SettlementLimits, Strength, make_check
 from tankcal.products.inspection.settlement import assess, settlement_figures
-from tankcal.products.inspection.verdict import make_check
 
 POINTS = (16, 20, 24)
 RADIUS_M, HEIGHT_M, E_PA = 15.0, 12.0, 206e9

@@ -13,7 +13,7 @@ from tankcal.job.tables import REGISTERS, TABLES
 from tankcal.products.workbench import desk
 from tankcal.products.workbench.computing import Refusal, Run, Stopped
 from tankcal.products.workbench.desk import Desk, open_job
-from tankcal.products.workbench.plain import warnings_page
+from tankcal.products.workbench.display import warnings_page
 from tankcal.products.workbench.tables import AmbiguousNumber, text_for_display, text_for_file
 from tankcal.text.shipped import LANGUAGES
 

@@ -15,8 +15,7 @@ from tankcal.job.model import Overruling
 from tankcal.messages import message
 from tankcal.products.workbench.views import page as pages
 from tankcal.products.workbench.views import results_view
-from tankcal.products.workbench.views.calculator import Calculator, parse_number
-from tankcal.products.workbench.views.page import SavedView, wall_page
+from tankcal.products.workbench.views.page import Calculator, SavedView, parse_number, wall_page
 from tankcal.products.workbench.views.what_if import budget_sentences, change_budget, table_html
 from tankcal.record import record_of
 from tankcal.report.paper import Paper
@@ -353,7 +352,7 @@ TICKET = {
 @pytest.fixture
 def quantity(widgets, paper):
     """Quantity panel in which the ticket was typed with the decimal mark of the language."""
-    from tankcal.products.workbench.views.quantity import QuantityPanel
+    from tankcal.products.workbench.views.panels import QuantityPanel
 
     panel = QuantityPanel(paper)
     for section, values in TICKET.items():
@@ -454,7 +453,7 @@ def test_a_slip_is_told_beside_its_field(paper, quantity):
 
 
 def test_a_form_without_entries_is_silent(widgets, paper):
-    from tankcal.products.workbench.views.quantity import QuantityPanel
+    from tankcal.products.workbench.views.panels import QuantityPanel
 
     panel = QuantityPanel(paper)
     panel.entries["closing.dip_m"].value = "4"

@@ -19,6 +19,7 @@ from tankcal.clouds.inside.floor_cells import (
     floor_grid,
     sum_floor_cells,
 )
+from tankcal.clouds.wall.cells import FILE
 from tankcal.clouds.wall.growing import (
     FEWEST,
     WALL,
@@ -27,7 +28,6 @@ from tankcal.clouds.wall.growing import (
     grow_wall,
 )
 from tankcal.clouds.wall.passes import Passes
-from tankcal.clouds.wall.screens import FILE
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 

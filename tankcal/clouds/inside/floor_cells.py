@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.clouds.wall.cells import COUNT, FINE, FINE_BITS, PLACE
-from tankcal.clouds.wall.surfaces import CylinderSurface
+from tankcal.clouds.wall.start import CylinderSurface
 
 PIECE = 1 << 16  # points added at a time
 BIN_M = 0.01  # width of a bin of the heights near the bottom, m

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.adjust import SD_OVER_MEDIAN
-from tankcal.clouds.wall.cells import FINE_BITS, PLACE, CellGrid
+from tankcal.clouds.wall.cells import FILE, FINE_BITS, PLACE, CellGrid, two_surfaces_error
 from tankcal.clouds.wall.features import (
     Joint,
     Obstruction,
@@ -27,7 +27,6 @@ from tankcal.clouds.wall.growing import (
     find_off_trend,
     grow_wall,
 )
-from tankcal.clouds.wall.screens import FILE, two_surfaces_error
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.units import FULL_TURN

@@ -9,11 +9,10 @@ from tankcal.job.contract import (
     correlations,
     courses,
     deadwood,
-    levels,
     overrulings,
+    registers,
     roof,
     ship,
-    stadia,
     stated,
     top,
     uncertainty,
@@ -40,10 +39,10 @@ SECTIONS = (
 )
 _TABLES = (courses, welds, bottom, deadwood, uncertainty, correlations, stated)
 COLUMNS = {table.__name__.rpartition(".")[2]: table.COLUMNS for table in _TABLES}
-COLUMNS |= stadia.COLUMNS
+COLUMNS |= registers.COLUMNS
 _KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS
 _KEYS |= {"bottom": bottom.KEYS, "top": top.KEYS, "roof": roof.KEYS, "ship": ship.KEYS}
-_KEYS["levels"] = levels.KEYS
+_KEYS["levels"] = stated.KEYS
 for _method in methods():
     COLUMNS |= _method.columns()
     REGISTER_KEYS |= _method.register_fields()
@@ -55,7 +54,7 @@ SURVEYS = ADJUSTED_SURVEYS | {
     "strapping": (),
     "reference-line": (),
     "wall-hits": (),  # filled in below, as for each survey of a method
-    "triangulation": (*stadia.COLUMNS, *stadia.BESIDE),
+    "triangulation": (*registers.COLUMNS, *registers.BESIDE),
     "tangents": (),
     "cloud": (),
     "liquid": (),

@@ -2,12 +2,77 @@
 
 from tankcal.camera.comparator import KINDS as TRANSFORMATIONS
 from tankcal.camera.model import AFFINITIES, CONVENTIONS
-from tankcal.job.contract.ranging import RANGING
 from tankcal.job.contract.shorthand import FREE, number
-from tankcal.job.contract.stadia import BAR
 from tankcal.job.fields import Field
+from tankcal.job.shared_columns import USE, angle_fields
 from tankcal.survey.network.survey import STATES
 
+USUAL_INCIDENCE_MM = 1.0  # default standard uncertainty of the bias at 60 degrees incidence, mm
+RANGING = (  # keys of instruments.toml for ranging on the wall
+    Field(
+        "s_mm",
+        "number",
+        "standard deviation of a distance to the bare wall, millimetres",
+        low=0,
+        high=1e3,
+        above_low=True,
+    ),
+    Field(
+        "s_arcsec",
+        "number",
+        "standard deviation of a direction or a zenith angle to the bare wall, seconds of arc",
+        low=0,
+        high=1e4,
+        above_low=True,
+    ),
+    Field(
+        "u_incidence_mm",
+        "number",
+        "standard uncertainty of the ranging bias at 60 degrees of incidence, relative to"
+        " perpendicular incidence, millimetres; blank: 1",
+        low=0,
+        high=100,
+    ),
+)
+LEAST = 3e-4  # least angle in turns: a bar of 2 m at 1 km, beyond which no distance is determined
+STADIA = (
+    Field("setup", "name", "set-up of setups.csv from which the bar was read", required=True),
+    Field("to", "name", "station under the middle of the bar", required=True),
+    Field("bar", "name", "stadia of instruments.toml; blank: the only stadia there"),
+    *angle_fields("angle", "horizontal angle between the ends of the bar", (LEAST, 0.25)),
+    Field(
+        "s_arcsec",
+        "number",
+        "standard deviation of the angle, seconds of arc",
+        required=True,
+        low=0,
+        high=1e4,
+        above_low=True,
+    ),
+    USE,
+)
+COLUMNS = {"stadia": STADIA}
+KIND = "stadia"  # kind of instrument
+BAR = (  # keys of instruments.toml for stadia
+    Field(
+        "length_m",
+        "number",
+        "distance between the marks of a stadia, metres",
+        low=0.1,
+        high=10,
+    ),
+    Field(
+        "u_mm",
+        "number",
+        "standard uncertainty of length_m, millimetres",
+        low=0,
+        high=100,
+    ),
+)
+BESIDE = (  # tables of a triangulation beside stadia
+    *("setups", "directions", "zenith_angles", "targets", "control", "check"),
+    *("distances", "height_differences", "correlated_readings"),
+)
 TAPE = (  # keys of instruments.toml for tapes
     number("thickness_mm", "thickness of a tape for strapping, millimetres", 0, 5),
     number(
@@ -76,6 +141,9 @@ _NOTES = {
     "b1": "affinity in place of A, for the form b1_b2",
     "b2": "affinity in place of B, for the form b1_b2",
 }
+
+
+# ---- keys of cameras.toml, instruments.toml, clouds.toml, meters.toml and [adjustment.camera]
 
 
 def _note(name):

@@ -7,6 +7,7 @@ archives whose unpacked size is out of proportion.
 import io
 import re
 import zipfile
+from xml.parsers import expat
 
 from tankcal.messages import message
 
@@ -16,7 +17,6 @@ MAX_MEMBERS = 5000  # largest number of parts
 MAX_RATIO, RATIO_FROM_BYTES = 300, 10_000_000  # largest unpacked over packed size, above a size
 MAX_TAGS = 2_500_000  # most start and end tags of all parts; a cell with a value has four
 CHUNK_BYTES = 1_000_000  # size of the pieces in which a part is read
-
 _BLANK_CELL = re.compile(rb"<c r=[^<>]*(?:/>|></c>)")
 _BLANK_ROW = re.compile(rb"<row r=[^<>]*(?:/>|>\s*</row>)")
 _OLE = b"\xd0\xcf\x11\xe0"
@@ -54,6 +54,8 @@ _REFUSED_PARTS = {
         "is_xlsb", "a binary workbook (.xlsb); {save_again}", save_again=_SAVE_AGAIN
     ),
 }
+MAX_PIECES = 20  # most pieces of the text of one element
+PIECE_CHARACTERS = 65_536  # longest piece of text, characters
 
 
 class Unreadable(Exception):
@@ -212,3 +214,81 @@ def _is_disguised(start):
     encoding = re.match(rb"\s*(?:\xef\xbb\xbf)?<\?xml[^>]*?encoding\s*=\s*[\"']([^\"']*)", start)
     usual = (b"utf-8", b"us-ascii", b"ascii", b"iso-8859-1", b"windows-1252")
     return encoding is not None and encoding[1].lower() not in usual
+
+
+# ---- XML of one part, read element by element; only the requested elements are kept
+
+
+def parse(archive, member, starts, ends):
+    """Read a part from beginning to end.
+
+    Names are without their prefix. Blank cells and rows are skipped.
+
+    Parameters
+    ----------
+    archive : ZipFile
+        The workbook.
+    member : str
+        Name of the part.
+    starts : dict of {str: callable}
+        {element: function(attributes)}, called at the start of an element.
+    ends : dict of {str: callable}
+        {element: function(text)}, called at its end with the text after its last child.
+
+    Raises
+    ------
+    Unreadable
+        For a declaration or a text that is too long.
+    ExpatError
+        For invalid XML.
+    """
+    parser = expat.ParserCreate()
+    parser.buffer_text, parser.buffer_size = True, PIECE_CHARACTERS
+    part = _Part(starts, ends)
+    parser.StartElementHandler = part.root
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = _refuse
+    part.parser = parser
+    for chunk in chunks(archive, member):
+        parser.Parse(without_blanks(chunk), False)
+    parser.Parse(b"", True)
+
+
+def _refuse(*_declaration):
+    raise damaged()
+
+
+class _Part:
+    """Handlers of one part; the prefix of the root element is removed from all names."""
+
+    def __init__(self, starts, ends):
+        self.starts, self.ends = starts, ends
+        self.pieces = []
+        self.parser = None
+
+    def root(self, name, attributes):
+        prefix = name[: name.find(":") + 1]
+        self.starts = {prefix + local: call for local, call in self.starts.items()}
+        self.ends = {prefix + local: call for local, call in self.ends.items()}
+        self.parser.StartElementHandler = self.start
+        self.parser.EndElementHandler = self.end
+        self.parser.CharacterDataHandler = self.text
+        self.start(name, attributes)
+
+    def start(self, name, attributes):
+        if self.pieces:
+            self.pieces.clear()
+        call = self.starts.get(name)
+        if call is not None:
+            call(attributes)
+
+    def end(self, name):
+        call = self.ends.get(name)
+        if call is not None:
+            call("".join(self.pieces))
+        if self.pieces:
+            self.pieces.clear()
+
+    def text(self, piece):
+        self.pieces.append(piece)
+        if len(self.pieces) > MAX_PIECES:
+            raise damaged()

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from tankcal.job.model.overrulings import Overruling
 from tankcal.job.model.parts import (
     Bottom,
     Course,
@@ -24,6 +23,7 @@ from tankcal.job.model.settings import (
     Inspection,
     Levels,
     Material,
+    Overruling,
     StatedVolume,
     Survey,
     Switches,

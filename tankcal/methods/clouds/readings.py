@@ -7,7 +7,7 @@ import numpy as np
 import tankcal.clouds
 from tankcal.clouds.contents import CloudHeader
 from tankcal.job.checking import has_rows
-from tankcal.job.contract.ranging import USUAL_INCIDENCE_MM
+from tankcal.job.contract.registers import USUAL_INCIDENCE_MM
 from tankcal.job.contract.shorthand import FREE
 from tankcal.methods.clouds.checks import has_network, poses_of, scans_of, unit_of
 from tankcal.methods.clouds.columns import ASSUMED

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tankcal.job.contract.ranging import USUAL_INCIDENCE_MM
-from tankcal.job.contract.registers import FREE
+from tankcal.job.contract.registers import FREE, USUAL_INCIDENCE_MM
 from tankcal.job.measuring import angle_in_rad, setups_of
 from tankcal.methods.hits.checks import instruments_used, ranging_of
 from tankcal.survey.wall_hits import ControlReading, RangingInstrument, WallHits

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from tankcal.errors import Problem
-from tankcal.job.contract.stadia import KIND
+from tankcal.job.contract.registers import KIND
 from tankcal.messages import message
 
 BY_CHANCE = 0.01  # share of valid surveys with an apparent movement due to scatter

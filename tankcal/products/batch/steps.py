@@ -13,8 +13,7 @@ from tankcal.job.folder import OF_INSPECTIONS
 from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import message
 from tankcal.products.batch.finding import RECORD, SAVED, BatchJob, find_former, find_former_or_none
-from tankcal.products.batch.fingerprints import compute_keys
-from tankcal.products.batch.journal import JOURNAL, Journal
+from tankcal.products.batch.journal import JOURNAL, Journal, compute_keys
 from tankcal.products.batch.options import FOLDERS
 from tankcal.products.batch.outcomes import (
     MOST_REPORTED,

@@ -1,23 +1,113 @@
-"""Document of a commissioning: gauge.json, CSV files, workbook and certificate."""
+"""Document of a commissioning: gauge.json, CSV files, workbook and certificate.
+
+Sketch of the three zeros for the certificate: dip plate, table and gauge.
+
+The sketch is not to scale: the zeros are drawn in their order, at equal distances. Lengths on the
+page are inches.
+"""
 
 from functools import partial
 from typing import ClassVar
 
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
 from tankcal.messages import message
 from tankcal.products.gauge.saved import GAUGE
-from tankcal.products.gauge.tables import BUDGET, CORRECTIONS, FILES, LEVELS, ZEROS
 from tankcal.report import blocks
 from tankcal.report.plain import words_with_part
+from tankcal.report.plots.style import GREY, INK, PALE, RED, WIDTH, styled
 from tankcal.report.saved_document import SavedDocument
 from tankcal.report.saved_paper import SavedPaper, bearable
+from tankcal.report.tables import Column, Table
 from tankcal.text.digits import format_with_u, shortest
 from tankcal.text.shipped import DEFAULT
 from tankcal.text.words import load_words
 
+_SHOWN = {"sheet": True, "width": 12}
 FILE, WORKBOOK, RECORD = "gauge.json", "gauge.xlsx", "record.json"
 DIGEST = 12  # printed digits of a SHA-256
 LONGEST_NUMBER = 60  # letters of the number of a certificate that fit into a line
 _SPACE = "\N{NO-BREAK SPACE}"
+_HEIGHT, _TOP = 1.7, 1.25  # of the page, and of the drawn roof
+_LEFT, _RIGHT, _PIPE = 0.5, 2.6, 1.7  # walls of the tank, middle of the still pipe
+_STEP = 0.24  # between two drawn zeros
+_TEXT = 3.05  # left edge of the labels
+_SMALL = 8
+_COLOURS = {"dip_plate": INK, "table": GREY, "gauge": RED}
+
+
+# ---- tables of a commissioning, declared once for certificate, workbook and CSV
+
+
+def _mm(key, u, **more):
+    """Column of millimetres with the digits of its U."""
+    return Column(key, "image mm", u=u, csv=key, least=1, **_SHOWN, **more)
+
+
+def _m(key, decimals=3):
+    return Column(key, "m", decimals=decimals, csv=key, **_SHOWN)
+
+
+def _k(on=None):
+    return Column("k", decimals=2, csv="k", on=on, **_SHOWN)
+
+
+LEVELS = Table(
+    "gauge_levels",
+    (
+        Column("name", text=lambda paper, row: row["name"], csv="name", sheet=True, width=14),
+        Column("count", decimals=0, csv="count", **_SHOWN),
+        _m("dip_m", 4),
+        _m("gauge_m", 4),
+        _mm("deviation_mm", "U_mm"),
+        _mm("U_mm", "U_mm"),
+        _k(),
+        _mm("residual_mm", "U_mm", on=""),
+        Column("w", decimals=1, csv="w", **_SHOWN),
+        Column("limit_mm", "image mm", decimals=1, csv="limit_mm", **_SHOWN),
+        Column("probability", "share", decimals=0, csv="probability", **_SHOWN),
+        Column("verdict", words="verdicts", csv="verdict", sheet=True, width=22),
+    ),
+    rows=lambda gauge: gauge["levels"],
+)
+CORRECTIONS = Table(
+    "gauge_corrections",
+    (
+        _m("gauge_m"),
+        _mm("correction_mm", "U_mm"),
+        _mm("U_mm", "U_mm"),
+        _k(on=""),
+        _mm("table_correction_mm", "U_table_mm"),
+        _mm("U_table_mm", "U_table_mm"),
+        Column("is_outside", words="outside", csv="is_outside", sheet=True, width=14),
+    ),
+    rows=lambda gauge: gauge["corrections"],
+)
+ZEROS = Table(
+    "gauge_zeros",
+    (
+        Column("code", words="zeros", csv="code", sheet=True, width=30),
+        _mm("z_mm", "U_mm"),
+        _mm("U_mm", "U_mm"),
+        Column("source", words="zero_sources", csv="source", sheet=True, width=34),
+    ),
+    rows=lambda gauge: gauge["zeros"],
+)
+BUDGET = Table(
+    "gauge_budget",
+    (
+        Column("source", words="sources", csv="source", sheet=True, width=34),
+        Column("low_mm", "image mm", decimals=2, csv="low_mm", **_SHOWN),
+        Column("middle_mm", "image mm", decimals=2, csv="middle_mm", **_SHOWN),
+        Column("high_mm", "image mm", decimals=2, csv="high_mm", **_SHOWN),
+        Column("dof", decimals=0, csv="dof", nothing="∞", **_SHOWN),
+    ),
+    rows=lambda gauge: gauge["budget"],
+)
+FILES = {"levels.csv": LEVELS, "corrections.csv": CORRECTIONS}
+
+# ---- document of a commissioning: gauge.json, CSV files, workbook and certificate
 
 
 class GaugePaper(SavedPaper):
@@ -222,7 +312,6 @@ def _slope_text(paper):
 
 def _zeros(paper):
     """Heading, sketch and table of the zeros."""
-    from tankcal.products.gauge.sketch import sketch
 
     return [
         blocks.with_next(paper.heading("zeros")),
@@ -350,3 +439,70 @@ DOCUMENT = SavedDocument(
     has_page=False,
     recomputed_by="tankcal.products.gauge.recomputation:compute_again",
 )
+
+# ---- sketch of the three zeros for the certificate: dip plate, table and gauge
+
+
+@styled
+def sketch(paper):
+    """Draw tank, gauge, zeros and reference height (matplotlib Figure)."""
+    gauge = paper.record
+    figure = Figure(figsize=(WIDTH, _HEIGHT))
+    ax = figure.add_axes((0, 0, 1, 1))
+    ax.set(xlim=(0, WIDTH), ylim=(0, _HEIGHT), aspect="equal")
+    ax.axis("off")
+    ax.plot([_LEFT, _LEFT, _RIGHT, _RIGHT], [_TOP, 0.2, 0.2, _TOP], color=INK, linewidth=1.4)
+    ax.plot([_LEFT, _RIGHT], [_TOP, _TOP], color=INK, linewidth=0.8)
+    ax.add_patch(Rectangle((_LEFT, 0.2), _RIGHT - _LEFT, 0.75, color=PALE, alpha=0.35, linewidth=0))
+    _draw_gauge(ax, gauge["gauge"]["supported_by"])
+    known = [zero for zero in gauge["zeros"][:3] if zero["z_mm"] is not None]
+    heights = _heights(known)
+    for zero, y in zip(known, heights, strict=True):
+        colour = _COLOURS[zero["code"]]
+        ax.plot([_LEFT + 0.1, _TEXT - 0.08], [y, y], color=colour, linewidth=1.0,
+                linestyle="-" if zero["code"] == "dip_plate" else (0, (5, 2)))  # fmt: skip
+        ax.text(_TEXT, y, _label(paper, zero), va="center", fontsize=_SMALL, color=colour)
+    _draw_reference(ax, paper, heights[known.index(gauge["zeros"][0])])
+    return figure
+
+
+def _heights(zeros):
+    """Height of each zero on the page, by its order; equal zeros are drawn apart."""
+    order = sorted(range(len(zeros)), key=lambda place: (zeros[place]["z_mm"], place))
+    return [0.34 + _STEP * order.index(place) for place in range(len(zeros))]
+
+
+def _label(paper, zero):
+    """Name of a zero with its z and U."""
+    name = paper.words["zeros"][zero["code"]]
+    if zero["code"] == "dip_plate":
+        return f"{name}: z = 0"
+    height = paper.text_with_u(zero["z_mm"], zero["U_mm"])
+    return f"{name}: z = {height}"
+
+
+def _draw_gauge(ax, support):
+    """Gauge on the roof; a still pipe down to the bottom, or ends above it."""
+    foot = 0.2 if support == "bottom" else 0.9
+    for side in (-0.06, 0.06):
+        ax.plot([_PIPE + side] * 2, [foot, _TOP + 0.12], color=GREY, linewidth=0.8)
+    ax.add_patch(Rectangle((_PIPE - 0.13, _TOP + 0.12), 0.26, 0.18, facecolor="white",
+                           edgecolor=INK, linewidth=0.9))  # fmt: skip
+
+
+def _draw_reference(ax, paper, y_plate):
+    """Reference point on the roof, and the reference height above the dip plate."""
+    zero = next((z for z in paper.record["zeros"] if z["code"] == "reference"), None)
+    x = 0.85
+    ax.add_patch(Rectangle((x - 0.07, _TOP), 0.14, 0.1, facecolor="white", edgecolor=INK,
+                           linewidth=0.9))  # fmt: skip
+    ax.plot([x - 0.16, x + 0.16], [y_plate, y_plate], color=INK, linewidth=2.2)
+    if zero is None:
+        return
+    top = _TOP + 0.1
+    ax.annotate("", (x, y_plate), (x, top), arrowprops={"arrowstyle": "<->", "color": GREY,
+                "linewidth": 0.7, "shrinkA": 0, "shrinkB": 0})  # fmt: skip
+    ax.plot([x + 0.07, _TEXT - 0.08], [top, top], color=GREY, linewidth=0.5)
+    name, height = paper.words["zeros"]["reference"], paper.reference_height()
+    text = f"{name}: H = {height}"
+    ax.text(_TEXT, top, text, va="center", fontsize=_SMALL, color=GREY)

@@ -22,8 +22,7 @@ from tankcal.gum.conformity import severity
 from tankcal.gum.coverage import coverage_factor
 from tankcal.messages import message
 from tankcal.products.inspection.levelling import LEAST_READINGS
-from tankcal.products.inspection.rules import largest_drop_mm
-from tankcal.products.inspection.verdict import PROBABILITY, Figure
+from tankcal.products.inspection.rules import PROBABILITY, Figure, largest_drop_mm
 from tankcal.record.inspection import EdgeProfile, InspectionLimit
 
 FAR_FROM_SHELL_M = 0.3  # distance of the last reading from the shell that causes a warning

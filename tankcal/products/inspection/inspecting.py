@@ -15,15 +15,16 @@ from tankcal.products.inspection.edges import assess_edges
 from tankcal.products.inspection.levelling import read_edge_profiles, read_settlement
 from tankcal.products.inspection.rules import (
     DEFAULT,
+    Figure,
     bulge_limits,
     edge_limits,
     find_rule,
     limit_of,
+    make_check,
     settlement_limits,
 )
 from tankcal.products.inspection.settlement import assess_settlement
 from tankcal.products.inspection.shape import LEAST_READ, empty_wall_figures, inspect_shape
-from tankcal.products.inspection.verdict import Figure, make_check
 from tankcal.products.inspection.weld_gaps import empty_gaps, find_gaps
 from tankcal.products.inspection.welds import list_welds
 from tankcal.record import content_error

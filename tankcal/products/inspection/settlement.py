@@ -34,8 +34,7 @@ from tankcal.products.inspection.out_of_plane import (
     select_subset,
     simulate_errors,
 )
-from tankcal.products.inspection.rules import compute_curvature_limit
-from tankcal.products.inspection.verdict import PROBABILITY, Figure
+from tankcal.products.inspection.rules import PROBABILITY, Figure, compute_curvature_limit
 from tankcal.record.inspection import Settlement, SettlementPoint
 
 SAME_TANK = 1.25  # largest ratio of two radii of the same tank

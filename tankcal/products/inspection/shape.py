@@ -10,8 +10,7 @@ from math import atan2, degrees, hypot
 import numpy as np
 
 from tankcal.gum.conformity import severity
-from tankcal.products.inspection.rules import limit_of
-from tankcal.products.inspection.verdict import PROBABILITY, Figure
+from tankcal.products.inspection.rules import PROBABILITY, Figure, limit_of
 from tankcal.record.inspection import Generatrices, InspectedLevel
 from tankcal.uncertainty import coverage_factor
 

@@ -16,11 +16,10 @@ from tankcal.errors import InputError, TankcalError, reason_of
 from tankcal.job.contract import SURVEYS, TABLES_OF_KIND
 from tankcal.job.tables import REGISTERS, TABLES
 from tankcal.products.workbench.computing import Refusal, Run
-from tankcal.products.workbench.display import Reader
+from tankcal.products.workbench.display import Reader, list_page, table_page, text_page
 from tankcal.products.workbench.draft import Draft
 from tankcal.products.workbench.findings import BAD, DOUBTFUL
 from tankcal.products.workbench.keys import SETTINGS, field_of
-from tankcal.products.workbench.plain import list_page, table_page, text_page
 from tankcal.products.workbench.tables import text_for_file
 from tankcal.report.folders import default_folder
 from tankcal.text.shipped import DEFAULT, nearest_language
@@ -429,7 +428,7 @@ class Results:
         self._desk = desk
 
     def _repr_mimebundle_(self, include=None, exclude=None):
-        from tankcal.products.workbench.plain import results_page
+        from tankcal.products.workbench.display import results_page
 
         desk = self._desk
         return bundle(desk, "results_panel", "" if desk.is_live else results_page(desk))

@@ -7,8 +7,8 @@ import ipywidgets as widgets
 
 from tankcal.errors import InputError, TankcalError, reason_of
 from tankcal.products.workbench.computing import Refusal
+from tankcal.products.workbench.display import warnings_page
 from tankcal.products.workbench.grid import Grid
-from tankcal.products.workbench.plain import warnings_page
 from tankcal.record import record_of
 
 PAUSE_S = 0.3  # pause after an edit before the job is checked

@@ -1,7 +1,11 @@
 """Plausibility of single numbers: ranges and cross-checks of `tankcal.job.plausibility`."""
 
-from tankcal.job.checks.plausible.levels import check_dates, check_levels
-from tankcal.job.checks.plausible.shell import check_material, check_plates
+from tankcal.job.checks.plausible.shell import (
+    check_dates,
+    check_levels,
+    check_material,
+    check_plates,
+)
 from tankcal.job.checks.plausible.sizes import check_rings, check_sizes, check_targets
 
 __all__ = ["check_plausible"]

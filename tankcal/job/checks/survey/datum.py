@@ -4,8 +4,7 @@ import numpy as np
 
 from tankcal.job.cameras import datum_point
 from tankcal.job.checking import has_rows, is_not_given, refuse_repeated, tell
-from tankcal.job.checks.survey.files import tell_rows
-from tankcal.job.checks.survey.names import all_points, observed_names
+from tankcal.job.checks.survey.files import all_points, observed_names, tell_rows
 from tankcal.job.contract.observations import ANGLES, READINGS
 from tankcal.job.tables import nearest
 from tankcal.messages import join_with_and, list_some, message

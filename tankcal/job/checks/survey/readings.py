@@ -6,7 +6,7 @@ import numpy as np
 
 from tankcal.errors import SHEET
 from tankcal.job.checking import has_rows
-from tankcal.job.checks.survey.angle_units import refuse_packed
+from tankcal.job.checks.survey.doubtful import refuse_packed
 from tankcal.job.checks.survey.files import tell_rows
 from tankcal.job.checks.survey.instruments import TAKEN_FROM_SETUPS
 from tankcal.job.contract.observations import ANGLES, READINGS

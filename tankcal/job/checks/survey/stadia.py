@@ -3,7 +3,7 @@
 from tankcal.job.checking import has_rows, tell_missing
 from tankcal.job.checks.survey.files import refuse_undefined
 from tankcal.job.checks.survey.readings import check_angle
-from tankcal.job.contract.stadia import KIND
+from tankcal.job.contract.registers import KIND
 from tankcal.messages import message
 
 

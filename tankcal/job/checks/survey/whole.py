@@ -1,13 +1,11 @@
 """All checks of the files of a survey, in the order of their reports."""
 
-from tankcal.job.checks.survey.cameras import check_cameras
+from tankcal.job.checks.survey.cameras import check_cameras, check_depth_of_field
 from tankcal.job.checks.survey.datum import check_datum, check_held, check_known
 from tankcal.job.checks.survey.doubtful import check_doubtful
-from tankcal.job.checks.survey.files import SurveyFiles
-from tankcal.job.checks.survey.focus import check_depth_of_field
+from tankcal.job.checks.survey.files import SurveyFiles, check_names
 from tankcal.job.checks.survey.images import check_images
 from tankcal.job.checks.survey.instruments import check_instruments
-from tankcal.job.checks.survey.names import check_names
 from tankcal.job.checks.survey.readings import check_correlated, check_readings
 from tankcal.job.checks.survey.stadia import check_stadia
 

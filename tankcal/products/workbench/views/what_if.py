@@ -12,7 +12,7 @@ from html import escape
 import ipywidgets as widgets
 
 from tankcal.errors import HeightError
-from tankcal.products.workbench.views.calculator import parse_number
+from tankcal.products.workbench.views.page import parse_number
 from tankcal.record.schema import to_plain
 from tankcal.record.table import budget_lines
 from tankcal.report.numbers import degrees_of_freedom
