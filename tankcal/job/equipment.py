@@ -21,16 +21,16 @@ REGISTER_KEY = f"{EQUIPMENT}_register"
 
 def add_shared_register(raw, log):
     """Return the RawJob with the register that `survey.equipment_register` names, if any."""
-    given = (raw.settings or {}).get("survey", {}).get(REGISTER_KEY)
-    if given is None or is_blank(given.raw):
+    key = (raw.settings or {}).get("survey", {}).get(REGISTER_KEY)
+    if key is None or is_blank(key.raw):
         return raw
-    place, name = (raw.settings_file, given.row, f"survey.{REGISTER_KEY}"), str(given.raw)
+    place, name = (raw.settings_file, key.row, f"survey.{REGISTER_KEY}"), str(key.raw)
     if EQUIPMENT in raw.registers:
         expected = message(
             "two_equipment_registers",
-            "found {name} and {own}; expected one register of equipment",
+            "found {name} and {local}; expected one register of equipment",
             name=name,
-            own=raw.file_of(EQUIPMENT),
+            local=raw.file_of(EQUIPMENT),
         )
         log.problem(place[0], expected, *place[1:])
         return raw
@@ -99,7 +99,7 @@ def _check_dates(item, survey_date, register, log):
     day = str(survey_date or "")
     if not day:
         return
-    given = register.entries[item.name]
+    entry = register.entries[item.name]
     if item.due and item.due < day:
         text = message(
             "equipment_overdue",
@@ -107,7 +107,7 @@ def _check_dates(item, survey_date, register, log):
             due=item.due,
             day=day,
         )
-        log.warning(register.file, text, given["due"].row, f"{item.name}.due")
+        log.warning(register.file, text, entry["due"].row, f"{item.name}.due")
     if item.date and item.date > day:
         text = message(
             "equipment_calibrated_later",
@@ -115,4 +115,4 @@ def _check_dates(item, survey_date, register, log):
             date=item.date,
             day=day,
         )
-        log.warning(register.file, text, given["date"].row, f"{item.name}.date")
+        log.warning(register.file, text, entry["date"].row, f"{item.name}.date")

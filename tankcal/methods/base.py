@@ -361,10 +361,10 @@ class Method:
         return
 
     def part(self, job, survey, switches):
-        """`tank.body.SolidPart` of a tank of one solid; None: made from `solid_part`."""
+        """`tank.body.SolidPart` of a tank of a single solid; None: made from `solid_part`."""
 
     def solid_part(self, survey, plate_m, scale):
-        """Inside of a tank of one solid, with the arguments of its `SolidPart`.
+        """Inside of a tank of a single solid, with the arguments of its `SolidPart`.
 
         Parameters
         ----------
@@ -444,7 +444,7 @@ class Method:
         return {}
 
     def sizes(self, result):
-        """Sizes of a tank of one solid, as surveyed: {name: (value, unit)}."""
+        """Sizes of a tank of a single solid, as surveyed: {name: (value, unit)}."""
         return {}
 
     # ---- report

@@ -122,11 +122,11 @@ class SummaryPaper(PlainPaper):
         return first if count <= 1 else self.word("texts.and_more", text=first, count=count - 1)
 
     def paper_name(self, row):
-        """Return the file name of the most important paper of a job, or None without papers."""
+        """Return the file name of the most important paper of a job, or None if there is none."""
         return row["papers"][0].rpartition("/")[2] if row["papers"] else None
 
     def paper_link(self, row):
-        """Return the relative address of this paper, or "" without papers."""
+        """Return the relative address of this report, or "" if there is none."""
         return quote(row["papers"][0]) if row["papers"] else ""
 
     def plain_row(self, row):
@@ -235,7 +235,7 @@ def _gone(paper):
 
 
 def _rows(paper):
-    """Return the table of the jobs, with links to their papers."""
+    """Return the table of the jobs, with links to their reports."""
     rows, note = paper.summary["rows"], []
     if len(rows) > MOST_ROWS:
         worst_first = sorted(rows, key=lambda row: -STATUSES.index(row["status"]))
@@ -258,7 +258,7 @@ def write_summary(paper, path):
     from tankcal.report.workbook.sections import SheetContent, cell_table, write_workbook
 
     def sheets(book):
-        # The only sheet: the table of the jobs, with links to their papers.
+        # The only sheet: the table of the jobs, with links to their reports.
         rows = paper.summary["rows"]
         links = [
             (f"external:{row['papers'][0]}", paper.paper_name(row)) if row["papers"] else ("", "")

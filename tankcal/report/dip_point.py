@@ -1,4 +1,4 @@
-"""The dip point of a record, for the papers and the sketch."""
+"""The dip point of a record, for reports and the sketch."""
 
 from dataclasses import dataclass
 from math import atan2, degrees, hypot

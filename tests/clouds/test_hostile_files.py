@@ -246,7 +246,7 @@ def died(tmp_path, monkeypatch, code):
     return str(caught.value)
 
 
-LIMITED = "from tankcal.clouds.formats import decoding; decoding.{name}({arguments}); "
+LIMITED = "from tankcal.clouds.formats import isolation; isolation.{name}({arguments}); "
 WORK = "import json, sys; sys.path[:] = json.loads(sys.argv[1])['sys_path']; "
 
 
@@ -272,9 +272,9 @@ def test_a_child_that_computes_for_ever(tmp_path, monkeypatch):
 
 def test_a_child_that_wants_all_memory(tmp_path, monkeypatch):
     code = WORK + (
-        "from tankcal.clouds.formats import decoding\n"
+        "from tankcal.clouds.formats import isolation\n"
         "def greedy(request): yield 0, 1, bytes(1 << 40)\n"
-        "decoding.laz_chunks = greedy; decoding.main({'kind': 'laz'})"
+        "isolation.laz_chunks = greedy; isolation.main({'kind': 'laz'})"
     )
     assert "more memory" in died(tmp_path, monkeypatch, code)
 
@@ -282,9 +282,9 @@ def test_a_child_that_wants_all_memory(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_a_child_that_gives_fewer_or_more_points(tmp_path, monkeypatch):
     code = WORK + (
-        "from tankcal.clouds.formats import decoding\n"
+        "from tankcal.clouds.formats import isolation\n"
         "def wrong(request): yield 0, {n}, bytes(12 * {n})\n"
-        "decoding.laz_chunks = wrong; decoding.main({{'kind': 'laz'}})"
+        "isolation.laz_chunks = wrong; isolation.main({{'kind': 'laz'}})"
     )
     for n in (49, 51):
         said = died(tmp_path, monkeypatch, code.format(n=n))

@@ -14,10 +14,11 @@ from tankcal import adjust, units
 from tankcal.calibration.parameters import recommendation, significance
 from tankcal.calibration.targets import coded
 from tankcal.clouds import reading as cloud_reading
-from tankcal.clouds.formats import counted_text, decoding, e57, lines
+from tankcal.clouds.formats import counted_text, e57, isolation, lines
 from tankcal.clouds.inside import bottom as cloud_bottom
 from tankcal.clouds.inside import floor_cells
-from tankcal.clouds.wall import deciding, features, growing, screens, start, unrolled
+from tankcal.clouds.wall import cells, deciding, features, growing, start
+from tankcal.clouds.wall import readings as cloud_readings
 from tankcal.geometry import patches, shell
 from tankcal.geometry.field import blunders, components, estimate, sites
 from tankcal.geometry.field.components import COMPONENTS
@@ -26,7 +27,7 @@ from tankcal.job import plausibility
 from tankcal.job.checks import settings, tapes
 from tankcal.job.checks.settings import MAX_TABLE_ROWS
 from tankcal.job.checks.survey import instruments
-from tankcal.job.contract import ranging
+from tankcal.job.contract import registers
 from tankcal.methods.clouds import bottom as clouds_bottom
 from tankcal.methods.clouds import overlaps
 from tankcal.methods.clouds import warnings as clouds_warnings
@@ -38,7 +39,7 @@ from tankcal.methods.inside_hits import solid as inside_solid
 from tankcal.methods.lines import warnings
 from tankcal.methods.lines import warnings as lines_warnings
 from tankcal.methods.liquid import columns as liquid_columns
-from tankcal.methods.liquid import facts as liquid_facts
+from tankcal.methods.liquid import figures as liquid_figures
 from tankcal.methods.strapping import tape_warnings
 from tankcal.pipeline import cluster, scanned_solids
 from tankcal.pipeline import overruling_effects as overruling
@@ -50,7 +51,7 @@ from tankcal.products.fieldbooks import lists
 from tankcal.products.gauge import deviation
 from tankcal.products.gauge import reading as gauge
 from tankcal.products.inspection import boards, edges, welds
-from tankcal.products.linter import pdf_text, totals
+from tankcal.products.linter import grids, totals
 from tankcal.products.quantity import reading as quantity
 from tankcal.products.recalibration import (
     basis,
@@ -553,7 +554,7 @@ LIMITS += [
         "distinguish from it (())",
         [liquid_adjustment.LEAST, liquid_adjustment.ALIKE],
     ),
-    ("docs/liquid.md", "Above () U the certificate states", [liquid_facts.HIDDEN_U]),
+    ("docs/liquid.md", "Above () U the certificate states", [liquid_figures.HIDDEN_U]),
     (
         "docs/liquid.md",
         "() mm in () m changes the head by () % of its value",
@@ -573,7 +574,7 @@ LIMITS += [
     (
         "docs/clouds.md",
         "in a child process with () GB of memory",
-        [decoding.MEMORY_LIMIT >> 30],
+        [isolation.MEMORY_LIMIT >> 30],
     ),
     (
         "docs/clouds.md",
@@ -656,12 +657,12 @@ LIMITS += [
     (
         "docs/clouds-wall.md",
         "(inwards for scans from outside) in () % of its coarse cells",
-        [PERCENT * screens.REAR_SHARE],
+        [PERCENT * cells.REAR_SHARE],
     ),
     (
         "docs/clouds-wall.md",
         "without a step in () % of the rows",
-        [PERCENT * screens.LEAVING_SHARE],
+        [PERCENT * cells.LEAVING_SHARE],
     ),
     (
         "docs/clouds-wall.md",
@@ -709,7 +710,7 @@ LIMITS += [
         "a meter that drifted by more than () %",
         [PERCENT * plausibility.METER_DRIFT],
     ),
-    ("docs/clouds-job.md", "| `u_incidence_mm` | () mm at 60°", [ranging.USUAL_INCIDENCE_MM]),
+    ("docs/clouds-job.md", "| `u_incidence_mm` | () mm at 60°", [registers.USUAL_INCIDENCE_MM]),
     (
         "docs/clouds-wall.md",
         "are counted in classes of () mm. The range is () m, or () of the radius",
@@ -951,7 +952,7 @@ LIMITS += [
     (
         "docs/limits.md",
         "At most () pages and () MB of drawing",
-        [pdf_text.MOST_PAGES, pdf_text.MOST_CONTENT / 1e6],
+        [grids.MOST_PAGES, grids.MOST_CONTENT / 1e6],
     ),
     (
         "docs/planning.md",
@@ -974,7 +975,7 @@ LIMITS += [
         "`checks.diameter_is` (() % + () mm)",
         [PERCENT * plausibility.DRAWN_MISS, MM * plausibility.DRAWN_MISS_M],
     ),
-    ("docs/record-format.md", "until at most () remain", [unrolled.MOST_CELLS]),
+    ("docs/record-format.md", "until at most () remain", [cloud_readings.MOST_CELLS]),
     ("docs/settlement.md", "to be at least (); not determined", [SETTLEMENT["least_r2"]]),
     (
         "docs/where.md",
@@ -997,7 +998,7 @@ LIMITS += [
         [plausibility.TARGET_MM["flat"][1]],
     ),
     ("docs/plausibility.md", "A departure within () in () is not detected", ONE_IN_500),
-    ("docs/liquid-papers.md", "changes a volume by more than () U", [liquid_facts.HIDDEN_U]),
+    ("docs/liquid-papers.md", "changes a volume by more than () U", [liquid_figures.HIDDEN_U]),
     (
         "docs/inspection.md",
         "gap under a board of () mm centred on a vertical or a horizontal weld: the largest gap "

@@ -1,6 +1,6 @@
 """Decoding of compressed files in a child process, so that a crash does not end the parent.
 
-The child (`decoding`) writes frames to its standard output. A frame has a head (kind, scan, records
+The child process writes frames to its standard output. A frame has a head (kind, scan, records
 read, bytes) and the bytes of the coordinates. The child limits its own memory and processor time.
 The parent ends a child that sends no frame for a long time.
 

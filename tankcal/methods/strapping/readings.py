@@ -1,4 +1,4 @@
-"""From the checked tables of a strapping to `Strapping`: SI units, one object for each reading."""
+"""From the checked tables of a strapping to `Strapping`: SI units, an object for each reading."""
 
 from tankcal.job.checks.tapes import tapes_of, tapes_read
 from tankcal.job.tapes import gauged, metres, tools_of

@@ -238,7 +238,7 @@ def _within(value, limits):
 def _of_copies(straps):
     """Problems of readings equal to the last digit more often than chance permits.
 
-    The readings may be of one circumference, or all readings of a circumference may repeat those of
+    The readings may be of a single circumference, or all readings of a circumference may repeat those of
     another circumference.
     """
     by_name, digit = {}, _digit_m(straps)
@@ -298,7 +298,7 @@ def chance_of_equal(sd_m, digit_m):
     Parameters
     ----------
     sd_m : float
-        Standard deviation of one reading, m.
+        Standard deviation of a reading, m.
     digit_m : float
         Unit to which a reading is rounded, m.
 

@@ -1,6 +1,6 @@
 """Wall measured by strapping, with or without reference lines.
 
-A circumference is the mean radius of one level, except for the area term (`geometry.girth`): the
+A circumference is the mean radius of a level, except for the area term (`geometry.girth`): the
 circle of the perimeter has a larger area than the wall. Each reading is therefore converted to the
 radius of the circle of equal area. With straps alone the courses are cylinders of these radii, as
 in the strapping standards. Form between the straps of a course (bulge, taper) is covered in the
