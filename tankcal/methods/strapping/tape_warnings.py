@@ -238,8 +238,8 @@ def _within(value, limits):
 def _of_copies(straps):
     """Problems of readings equal to the last digit more often than chance permits.
 
-    The readings may be of a single circumference, or all readings of a circumference may repeat those of
-    another circumference.
+    The readings may be of a single circumference, or all readings of a circumference may repeat
+    those of another circumference.
     """
     by_name, digit = {}, _digit_m(straps)
     for strap in straps:
