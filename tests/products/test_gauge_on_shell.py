@@ -8,6 +8,7 @@ import csv
 import numpy as np
 import pytest
 from conftest import EXAMPLE
+from page_figures import agree, figures_of
 from test_gauge import computed, record_folder, write
 
 from tankcal.cli import main
@@ -100,6 +101,11 @@ def test_coverage_of_the_corrections_of_a_gauge_on_the_shell(
         inside.append((np.abs(off_mm) <= U)[[0, len(U) // 2, -1]])
     share = np.mean(inside, axis=0)
     figure(f"coverage of a gauge on the shell, dips {dip_mm} mm", share.round(3).tolist())
+    stated = {
+        0.1: figures_of("docs/gauge.md", "| 0.1 mm | () | () | () |"),
+        1.0: figures_of("docs/gauge.md", "| 1 mm | () | () | () |"),
+    }
+    assert agree(share, stated[dip_mm])
     assert share.min() >= 0.92  # 300 draws: 0.95 less 2.4 standard errors
 
 
