@@ -10,7 +10,7 @@ from pathlib import Path
 import openpyxl
 import pytest
 from filled_forms import fill_form, place_of
-from page_figures import figures_of
+from page_figures import figures_of, value_of
 from page_sessions import FENCE, agrees, blocks_of, commands_of, run_page
 
 import tankcal
