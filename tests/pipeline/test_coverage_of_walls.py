@@ -20,8 +20,6 @@ from tankcal.pipeline.wall.finding import find_wall
 from tankcal.tank.capacity import Capacity
 
 LEAST_HELD, LEAST_IN_CLASS = 0.94, 0.92
-# Assumed kurtosis of relative errors, which differ much between families and radii.
-KURTOSIS = 12.0
 MOST_WIDE = 1.6  # mean U over 1.96 rms errors
 ROWS, DELIVERIES, DELIVERED_M = 10, 5, 2.0
 
@@ -103,10 +101,14 @@ def shares_of(found):
 
 
 def assert_as_stated(parts, wide, count, stated, full):
-    """Shares and ratio of `count` tanks are those of `full` tanks on a page, by sampling error."""
+    """Shares and ratio of `count` tanks are those of `full` tanks on a page, by sampling error.
+
+    The ratio is compared at full size only: in a few tanks of several families and radii one error
+    determines the rms, so its sampling error is not that of normal errors.
+    """
     *shares, ratio = stated
     assert shares_agree(parts, shares, count, full), (parts, shares)
-    assert ratios_agree(wide, ratio, count, full, KURTOSIS), (wide, ratio)
+    assert draws(True, ratios_agree(wide, ratio, count, full)), (wide, ratio)
 
 
 def least_in_class(walls, classes):

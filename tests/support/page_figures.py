@@ -108,11 +108,10 @@ def shares_agree(shares, texts, count, full):
     return True
 
 
-def ratios_agree(ratio, text, count, full, kurtosis=3.0):
+def ratios_agree(ratio, text, count, full):
     """Whether mean U over the rms error of `count` draws agrees with the ratio of `full` draws.
 
-    The variance of a mean square is its square times (kurtosis - 1) / count; normal errors have
-    the kurtosis 3.
+    The variance of a mean square of normal errors is its square times 2 / count.
     """
-    error = math.sqrt((kurtosis - 1) / 4 * (1 / count + 1 / full))
+    error = math.sqrt((1 / count + 1 / full) / 2)
     return abs(math.log(ratio / value_of(text))) <= 3.3 * error
