@@ -43,11 +43,11 @@ def blocks_of(notebook, part="", name="notebook"):
         raise TankcalError(f"the notebook has nothing to show that is tagged {part!r}")
     if not shown or shown[0]["kind"] != "document":
         shown.insert(0, blocks.document(title=name).data)
-    return _headings_in_steps(shown if part else _as_copy(shown))
+    return _headings_in_steps(shown if part else _mark_copy(shown))
 
 
-def _as_copy(shown):
-    """Return the blocks of a whole notebook without signature; a notice below the title says so.
+def _mark_copy(shown):
+    """Return the blocks of a whole notebook without signature, with a notice below the title.
 
     Only the PDF of the certificate is signed, so that a certificate has a single original.
     """
