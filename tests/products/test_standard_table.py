@@ -13,7 +13,7 @@ from quantity_cases import ticket_of
 
 from tankcal.cli import main
 from tankcal.errors import InputError
-from tankcal.products.quantity.standard_table import compute_standard_table, dips_of
+from tankcal.products.quantity.standard_table import compute_standard_table, list_dips
 from tankcal.products.quantity.table import TankTable, read_table
 from tankcal.tank.volume_correction.petroleum import Petroleum
 from tankcal.text.shipped import LANGUAGES
@@ -100,8 +100,8 @@ def test_a_roof_has_no_volumes_below_the_level_at_which_it_floats(settings, tmp_
 
 def test_dips_are_whole_steps_within_the_table():
     table = replace(cylinder(), height_m=np.linspace(0.137, 1.21, 5))
-    assert dips_of(table, 10).tolist() == [step / 10 for step in range(2, 13)]
-    assert dips_of(table, 7).tolist() == [7 * step / 100 for step in range(2, 18)]
+    assert list_dips(table, 10).tolist() == [step / 10 for step in range(2, 13)]
+    assert list_dips(table, 7).tolist() == [7 * step / 100 for step in range(2, 18)]
 
 
 @pytest.mark.parametrize("suffix", ["csv", "xlsx", "pdf"])

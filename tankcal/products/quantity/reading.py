@@ -701,7 +701,7 @@ def _refuse_outside_correction(source, gaugings, product):
     rows = np.flatnonzero(is_complete)
 
     def density_at_base(rows):
-        return _product_of(product, rows).base_density()
+        return _select_product(product, rows).base_density()
 
     def name_of(error):
         is_sample = error.quantity == "temperature_c"
@@ -750,7 +750,7 @@ def _rows_inside(source, product, rows, evaluate, name_of):
     return rows
 
 
-def _product_of(product, rows):
+def _select_product(product, rows):
     """`Product` of some tickets, by their indices."""
     arrays = {name: getattr(product, name)[rows]
               for name in ("density", "glass", "water_share", "expansion_per_k")}  # fmt: skip
@@ -789,7 +789,7 @@ def _refuse_negative(source, table, gaugings, product):
                    "further above the water and the roof")  # fmt: skip
     for state, gauging in gaugings.items():
         some = {field.name: getattr(gauging, field.name)[rows] for field in _READINGS}
-        gov = follow_chain(table, replace(gauging, **some), _product_of(product, rows)).gov_m3
+        gov = follow_chain(table, replace(gauging, **some), _select_product(product, rows)).gov_m3
         is_negative = np.zeros(source.count, dtype=bool)
         is_negative[rows] = ~(gov > 0)
         source.tell_each(f"{state}.dip_m", is_negative, lambda _: text)

@@ -92,7 +92,7 @@ def compute_standard_table(table, settings, temperatures_c, densities, step_cm=1
         For invalid settings, values outside the range of the volume correction, and a table with
         too many cells.
     """
-    dips = dips_of(table, step_cm)
+    dips = list_dips(table, step_cm)
     shape = len(densities), len(temperatures_c), len(dips)
     _check_size(shape)
     plain = _transfer(table, settings, densities[0])
@@ -130,7 +130,7 @@ def compute_standard_table(table, settings, temperatures_c, densities, step_cm=1
     )  # fmt: skip
 
 
-def dips_of(table, step_cm):
+def list_dips(table, step_cm):
     """Dips of the table at whole multiples of a step in centimetres, m."""
     first, last = (100 * table.height_m[end] / step_cm for end in (0, -1))
     # The tolerance keeps a dip at a whole centimetre in spite of binary fractions.

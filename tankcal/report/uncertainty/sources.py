@@ -30,7 +30,7 @@ def roof_of(record):
     return {line["code"]: line["value"] for line in record["roof"]}
 
 
-def room_levels_of(record):
+def read_room_levels(record):
     """Return {name of a room: dip} of the operating levels that the calculators can use."""
     heights = record["capacity"]["height_m"]
     zone = None

@@ -14,8 +14,8 @@ from tankcal.report.uncertainty.sources import (
     critical_zone,
     groups_of,
     is_roof_in_table,
+    read_room_levels,
     roof_of,
-    room_levels_of,
 )
 from tankcal.report.uncertainty.stated import flag_simulated, stated_rows, stated_U_m3
 from tankcal.report.web.packing import pack_numbers
@@ -162,7 +162,7 @@ def quantity_data(record):
         "roof": _roof_data(record),
         "rooms": [
             {"name": name, "level_m": dip, "sign": ROOMS[name][1]}
-            for name, dip in room_levels_of(record).items()
+            for name, dip in read_room_levels(record).items()
         ],
         "air": AIR_KG_M3,
         "weights": WEIGHTS_KG_M3,

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from tankcal.report.uncertainty.sources import room_levels_of
+from tankcal.report.uncertainty.sources import read_room_levels
 from tankcal.report.workbook.calculator.cells import Places, quoted
 from tankcal.report.workbook.calculator.sentences import refused_word
 from tankcal.report.workbook.calculator.table import Table
@@ -98,7 +98,7 @@ def quantity_sheets(book, record):
     ]
     rows, results = _addresses(workings)
     form = _Form(book, Places(book, rows, KEYS), results, _sentences(book, table))
-    form.write(room_levels_of(record))
+    form.write(read_room_levels(record))
     _workings_sheet(book, workings, form.places, form.texts)
 
 

@@ -8,7 +8,7 @@ import math
 from dataclasses import replace
 from itertools import pairwise
 
-from tankcal.report.uncertainty.sources import roof_of, room_levels_of
+from tankcal.report.uncertainty.sources import read_room_levels, roof_of
 from tankcal.report.workbook.calculator.coverage import normal, student
 from tankcal.report.workbook.quantity.correction import TYPED
 from tankcal.report.workbook.quantity.gauging import interpolation_formulas
@@ -218,7 +218,7 @@ def _rooms(table):
     roof = roof_of(table.record) if table.record["roof"] else None
     columns = [
         [_fill_state(row, name) for row in _room_rows(table, name, dip, roof)]
-        for name, dip in room_levels_of(table.record).items()
+        for name, dip in read_room_levels(table.record).items()
     ]
     return [
         replace(rows[0], cells=tuple(cell for row in rows for cell in row.cells))
