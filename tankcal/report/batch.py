@@ -10,7 +10,7 @@ from urllib.parse import quote
 from tankcal.errors import problem_from
 from tankcal.report import blocks
 from tankcal.report.plain import PlainPaper, words_with_part
-from tankcal.report.saved_paper import bearable, signed_text
+from tankcal.report.saved_document import bearable, signed_text
 from tankcal.report.tables import Column, Table
 from tankcal.text.words import load_words, say
 

@@ -21,8 +21,8 @@ from tankcal.errors import TankcalError
 from tankcal.memory import return_freed_memory
 from tankcal.messages import printable
 from tankcal.report import attachments
+from tankcal.report.attachments import with_signature_field
 from tankcal.report.blocks import WEB_ONLY
-from tankcal.report.pdf_objects import with_signature_field
 from tankcal.report.plain_formulas import formula_nodes
 from tankcal.text.shipped import shipped_folder
 

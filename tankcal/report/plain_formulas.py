@@ -7,7 +7,7 @@ rest of a sentence remains text.
 import re
 from functools import cache
 
-from tankcal.report.latex_math import formula
+from tankcal.report.markdown import formula
 
 _NUMBER = r"(\d+[.,]\d+)"
 _SET_AS = (  # pattern of the plain text and LaTeX; a longer pattern precedes its own beginning

@@ -304,7 +304,7 @@ def _compare_covariance(verification, path, adjustment):
     import numpy as np
 
     from tankcal.record.recomputation import TOLERANCE
-    from tankcal.report.outputs.tables import write_covariance
+    from tankcal.report.outputs.csv_files import write_covariance
 
     with tempfile.TemporaryDirectory(prefix="tankcal-") as place:
         write_covariance(adjustment, Path(place))

@@ -16,7 +16,7 @@ from tankcal.messages import message
 from tankcal.record.manifest import digest_of
 from tankcal.report import dcc
 from tankcal.report.attachments import sha256
-from tankcal.report.outputs import RECORD, tables
+from tankcal.report.outputs import RECORD, csv_files
 from tankcal.report.workbook.book import RECORD_PROPERTY
 
 INPUT_CODES = ("verify_input_missing", "verify_input_changed")
@@ -239,10 +239,12 @@ def compare_tables(verification, folder, record):
     """
     if record["tankcal"] != tankcal.__version__:
         return  # another version may write another format
-    present = [name for name in tables.FILES if name.endswith(".csv") and (folder / name).is_file()]
+    present = [
+        name for name in csv_files.FILES if name.endswith(".csv") and (folder / name).is_file()
+    ]
     with tempfile.TemporaryDirectory(prefix="tankcal-") as again:
         try:
-            tables.write_tables(record, Path(again))
+            csv_files.write_tables(record, Path(again))
         except (LookupError, TypeError, ValueError, AttributeError):
             text = message("verify_no_tables", "does not have the content of a record")
             raise InputError(Problem(RECORD, text)) from None

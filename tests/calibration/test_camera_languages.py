@@ -18,7 +18,7 @@ from tankcal.record import camera_analyses as stability_json
 from tankcal.record.camera_versions import KINDS
 from tankcal.report import camera as camera_papers
 from tankcal.report.camera import paper as papers
-from tankcal.report.camera.drawings import widen_to_decades
+from tankcal.report.camera.figures import widen_to_decades
 from tankcal.report.camera.paper import shorten
 from tankcal.report.notebook import join_templates
 from tankcal.report.numbers import UNITS

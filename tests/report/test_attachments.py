@@ -7,9 +7,8 @@ import zlib
 import pytest
 
 from tankcal.report import attachments, blocks
-from tankcal.report.attachments import Packed, beside, hold
+from tankcal.report.attachments import Packed, beside, hold, objects_of, with_signature_field
 from tankcal.report.pdf import pdf
-from tankcal.report.pdf_objects import objects_of, with_signature_field
 
 pypdf = pytest.importorskip("pypdf")
 deflated = zlib.compress

@@ -15,7 +15,7 @@ from tankcal.errors import CellError, TankcalError
 from tankcal.report import blocks
 from tankcal.report import pdf as pdf_of
 from tankcal.report.document import PARTS, blocks_of, last_cell
-from tankcal.report.latex_math import _FUNCTIONS, _GREEK, _OPERATORS, _SPACES, _SYMBOLS
+from tankcal.report.markdown import _FUNCTIONS, _GREEK, _OPERATORS, _SPACES, _SYMBOLS
 from tankcal.report.notebook import execute, join_templates, notebook_text
 from tankcal.report.papers import FILES, build
 from tankcal.report.pdf import pdf

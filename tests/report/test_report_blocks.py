@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 from tankcal.errors import TankcalError
 from tankcal.job.contract import KEYS
 from tankcal.report import blocks
-from tankcal.report.latex_math import formula
-from tankcal.report.markdown import nodes
+from tankcal.report.markdown import formula, nodes
 from tankcal.report.numbers import symbol, unit
 from tankcal.report.paper import Column, Paper
 from tankcal.report.web import block_html

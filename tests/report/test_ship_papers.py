@@ -12,7 +12,7 @@ import tankcal
 from tankcal import record as records
 from tankcal.record import record_of
 from tankcal.report import ship
-from tankcal.report.outputs.tables import write_tables
+from tankcal.report.outputs.csv_files import write_tables
 from tankcal.report.plain import PlainPaper
 from tankcal.report.tables import ship as tables
 from tankcal.text.shipped import LANGUAGES

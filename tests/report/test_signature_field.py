@@ -7,8 +7,8 @@ import pytest
 from paper_cells import paper_blocks
 
 from tankcal.report import blocks
+from tankcal.report.attachments import FIELD_NAME, SIGNATURE_LINK, with_signature_field
 from tankcal.report.pdf import pdf
-from tankcal.report.pdf_objects import FIELD_NAME, SIGNATURE_LINK, with_signature_field
 
 pypdf = pytest.importorskip("pypdf")
 DIGEST = "0123456789abcdef" * 4

@@ -7,8 +7,8 @@ from jacobians import assert_derivative
 from tankcal.errors import HeightError, SolutionError
 from tankcal.tank.bottoms import shaped_bottom
 from tankcal.tank.fittings import deadwood
-from tankcal.tank.liquid_zone import PartAbove, measured_bottom
 from tankcal.tank.parts import Part
+from tankcal.tank.volumes import PartAbove, measured_bottom
 
 AREA = np.pi * 6.5**2
 LEVELS = np.array([-0.15, -0.10, -0.05, 0.0, 0.05, 0.12, 0.20, 0.30])

@@ -17,12 +17,11 @@ from tankcal.tank.budgets import Factor
 from tankcal.tank.fittings import deadwood, floating_roof
 from tankcal.tank.heads import End
 from tankcal.tank.hydrostatics import liquid_head
-from tankcal.tank.liquid_zone import PartAbove, measured_bottom
 from tankcal.tank.meshes import closed_mesh, mesh_part
 from tankcal.tank.parts import Part
 from tankcal.tank.solids import LyingTank, Sphere
 from tankcal.tank.terrain import Footprint
-from tankcal.tank.volumes import ShellVolume
+from tankcal.tank.volumes import PartAbove, ShellVolume, measured_bottom
 
 AREA = np.pi * 6.5**2
 NAMES = ("plate_thickness", "paint")

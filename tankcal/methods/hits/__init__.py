@@ -64,12 +64,12 @@ class HitsMethod(Method):
     # ---- known walls
 
     def observe(self, job, wall, errors):
-        from tankcal.methods.hits.observed import observe_hits
+        from tankcal.methods.hits.readings import observe_hits
 
         return observe_hits(job, wall, errors)
 
     def levels_read(self, job):
-        from tankcal.methods.hits.observed import levels_of_hits
+        from tankcal.methods.hits.readings import levels_of_hits
 
         return set(levels_of_hits(job))
 

@@ -92,7 +92,7 @@ class StrappingMethod(Method):
     # ---- known walls
 
     def observe(self, job, wall, errors):
-        from tankcal.methods.strapping.observed import observe_straps
+        from tankcal.methods.strapping.readings import observe_straps
 
         return observe_straps(job, wall, errors)
 

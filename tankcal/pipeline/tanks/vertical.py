@@ -230,7 +230,7 @@ def _on_its_bottom(job, wall, shell, zero, parts):
     """Parts with the bottom: beside them, or below them if it was calibrated by liquid."""
     bottom = job.bottom
     if bottom.form == "liquid":
-        from tankcal.tank.liquid_zone import PartAbove, measured_bottom
+        from tankcal.tank.volumes import PartAbove, measured_bottom
 
         measured = measured_bottom(bottom.level_m + zero, bottom.volume_m3, bottom.u_m3)
         return [*(PartAbove(part, measured.highest_m) for part in parts), measured]

@@ -17,8 +17,7 @@ from tankcal.products.gauge.saved import GAUGE
 from tankcal.report import blocks
 from tankcal.report.plain import words_with_part
 from tankcal.report.plots.style import GREY, INK, PALE, RED, WIDTH, styled
-from tankcal.report.saved_document import SavedDocument
-from tankcal.report.saved_paper import SavedPaper, bearable
+from tankcal.report.saved_document import SavedDocument, SavedPaper, bearable
 from tankcal.report.tables import Column, Table
 from tankcal.text.digits import format_with_u, shortest
 from tankcal.text.shipped import DEFAULT

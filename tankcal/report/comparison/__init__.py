@@ -11,8 +11,7 @@ from tankcal.messages import message
 from tankcal.record.comparison import COMPARISON
 from tankcal.report.comparison.tables import COURSES, DELIVERIES, ROWS, WATERFALL, unit_symbol
 from tankcal.report.plain import words_with_part
-from tankcal.report.saved_document import SavedDocument
-from tankcal.report.saved_paper import SavedPaper, bearable, iso_day, signed_text
+from tankcal.report.saved_document import SavedDocument, SavedPaper, bearable, iso_day, signed_text
 from tankcal.text.digits import LITRE_DECIMALS, NOTHING
 from tankcal.text.shipped import DEFAULT
 from tankcal.text.words import load_words

@@ -5,7 +5,7 @@ import textwrap
 import numpy as np
 from matplotlib.figure import Figure
 
-from tankcal.report.camera.drawings import styled
+from tankcal.report.camera.figures import styled
 from tankcal.report.comparison.tables import FINE, shown_steps
 from tankcal.report.plots.style import FAINT, GREY, INK, PALE, RED, WIDTH, set_margins
 from tankcal.text.digits import fixed

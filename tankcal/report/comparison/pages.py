@@ -12,7 +12,7 @@ from tankcal.report.comparison.tables import (
 )
 from tankcal.report.markdown import nodes
 from tankcal.report.plain import Column
-from tankcal.report.saved_paper import bearable, iso_day, shortened, signed_text
+from tankcal.report.saved_document import bearable, iso_day, shortened, signed_text
 from tankcal.text.digits import NOTHING
 
 LEGAL = (

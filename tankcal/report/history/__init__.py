@@ -16,8 +16,7 @@ from tankcal.report.history.tables import (
     VOLUMES,
 )
 from tankcal.report.plain import words_with_part
-from tankcal.report.saved_document import SavedDocument
-from tankcal.report.saved_paper import SavedPaper, bearable
+from tankcal.report.saved_document import SavedDocument, SavedPaper, bearable
 from tankcal.text.shipped import DEFAULT
 from tankcal.text.words import load_words
 

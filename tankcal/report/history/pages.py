@@ -11,7 +11,7 @@ from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
 from matplotlib.figure import Figure
 
 from tankcal.report import blocks
-from tankcal.report.camera.drawings import COLOURS, line_style, styled
+from tankcal.report.camera.figures import COLOURS, line_style, styled
 from tankcal.report.comparison.figures import draw_E_n_limits, typeset_E_n
 from tankcal.report.history.tables import (
     CERTIFICATES,
@@ -25,7 +25,7 @@ from tankcal.report.history.tables import (
 )
 from tankcal.report.plain import Column
 from tankcal.report.plots.style import FAINT, INK, RED, WIDTH, set_margins
-from tankcal.report.saved_paper import bearable
+from tankcal.report.saved_document import bearable
 from tankcal.report.workbook.book import workbook_head
 from tankcal.report.workbook.sections import Sentences, SheetContent, cell_table, write_workbook
 

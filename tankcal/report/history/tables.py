@@ -1,6 +1,6 @@
 """Tables of a history, declared once for PDF, web page, workbook and CSV, and their rows."""
 
-from tankcal.report.saved_paper import bearable
+from tankcal.report.saved_document import bearable
 from tankcal.report.tables import Column, Table
 from tankcal.text.digits import LITRE_DECIMALS
 

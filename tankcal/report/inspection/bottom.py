@@ -6,11 +6,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tankcal.report import blocks
-from tankcal.report.camera.drawings import line_style, styled
+from tankcal.report.camera.figures import line_style, styled
 from tankcal.report.inspection.paper import epoch_name
 from tankcal.report.inspection.tables import CHECKS, EDGES, POINTS, READING
 from tankcal.report.plots.style import FAINT, GREY, INK, RED, WIDTH, set_margins
-from tankcal.report.saved_paper import bearable
+from tankcal.report.saved_document import bearable
 from tankcal.report.tables import Column
 
 # Largest number of points, and of letters of a name, for a table in two columns of the page.

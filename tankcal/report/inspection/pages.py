@@ -32,7 +32,7 @@ from tankcal.report.inspection.tables import (
     sheet_rows,
 )
 from tankcal.report.inspection.wall import courses, departures, levels, welds
-from tankcal.report.saved_paper import bearable, shortened
+from tankcal.report.saved_document import bearable, shortened
 from tankcal.report.workbook.book import workbook_head
 from tankcal.report.workbook.sections import (
     FIRST_LINE,

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from tankcal.record.inspection import INSPECTION
 from tankcal.report.plain import words_with_part
-from tankcal.report.saved_paper import SavedPaper, bearable, iso_day, signed_text
+from tankcal.report.saved_document import SavedPaper, bearable, iso_day, signed_text
 from tankcal.text.digits import NOTHING, fixed, shortest
 from tankcal.text.shipped import DEFAULT
 from tankcal.text.words import load_words

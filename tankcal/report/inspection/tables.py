@@ -1,7 +1,7 @@
 """Tables of an inspection for report and workbook, and their rows."""
 
 from tankcal.report.inspection.paper import epoch_name, unit_of
-from tankcal.report.saved_paper import bearable
+from tankcal.report.saved_document import bearable
 from tankcal.report.tables import Column, Table
 from tankcal.text.digits import NOTHING
 

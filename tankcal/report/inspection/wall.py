@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tankcal.report import blocks
-from tankcal.report.camera.drawings import styled
+from tankcal.report.camera.figures import styled
 from tankcal.report.inspection.tables import (
     COURSES,
     GAPS,

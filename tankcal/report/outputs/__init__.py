@@ -15,7 +15,7 @@ from tankcal.record import long_tables, manifest
 from tankcal.report import dcc, folders
 from tankcal.report.attachments import sha256
 from tankcal.report.letterhead import LETTERHEAD_FILE
-from tankcal.report.outputs import tables
+from tankcal.report.outputs import csv_files
 from tankcal.report.papers import FILES as PAPER_FILES
 from tankcal.report.papers import build
 from tankcal.text.shipped import LANGUAGES
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 RECORD = "record.json"
 WORKBOOKS = ("capacity.xlsx", "adjustment.xlsx")
 FILES = (
-    *(RECORD, long_tables.FILE, *tables.FILES, *WORKBOOKS, dcc.FILE),
+    *(RECORD, long_tables.FILE, *csv_files.FILES, *WORKBOOKS, dcc.FILE),
     *(*PAPER_FILES, LETTERHEAD_FILE, manifest.FILE),
 )
 
@@ -70,7 +70,7 @@ def write(
         record = records.record_of(result)
         records.save(record, folder / RECORD)
         if result.adjustment is not None:
-            tables.write_covariance(result.adjustment, folder)
+            csv_files.write_covariance(result.adjustment, folder)
         return record
 
     return _write(prepare, directory, progress, letterhead=letterhead, papers=papers)
@@ -97,7 +97,7 @@ def write_adjustment(job, adjustment, directory, progress=None, letterhead=None,
     def prepare(folder):
         record = records.record_of_adjustment(job, adjustment)
         records.save(record, folder / RECORD)
-        tables.write_covariance(adjustment, folder)
+        csv_files.write_covariance(adjustment, folder)
         return record
 
     return _write(prepare, directory, progress, letterhead=letterhead, papers=papers)
@@ -178,7 +178,7 @@ def _write(prepare, directory, progress, language=None, letterhead=None, papers=
         progress(message("writing_record", "writing the record and the tables"), 0, 1)
         with without_collection():
             record = prepare(temporary)
-            tables.write_tables(record, temporary)
+            csv_files.write_tables(record, temporary)
         if papers:
             with without_looking_back():
                 _write_papers(record, temporary, progress, language, letterhead)

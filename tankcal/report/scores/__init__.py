@@ -9,7 +9,7 @@ from tankcal.messages import message
 from tankcal.record import save
 from tankcal.record.schema import to_plain
 from tankcal.report import folders
-from tankcal.report.scores.paper import FILE, PAGE, WORKBOOK, ScoresPaper
+from tankcal.report.scores.pages import FILE, PAGE, WORKBOOK, ScoresPaper
 
 __all__ = ["FILES", "ScoresPaper", "refuse_foreign", "write_scores"]
 
