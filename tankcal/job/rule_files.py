@@ -101,7 +101,7 @@ class RuleFiles:
     has_names : bool
         Whether the sections are [SECTION.NAME], so that a kind of limit may occur repeatedly.
     check : callable, optional
-        check(file, part, section, values, given, row, log) reports contradictions in a section.
+        check(file, part, section, values, keys, row, log) reports contradictions in a section.
     """
 
     folder: str
@@ -122,17 +122,17 @@ class RuleFiles:
             file, "rule", self.head, settings.pop("rule", {}), rows.get("rule"), log
         )
         limits = []
-        for section, given in settings.items():
+        for section, keys in settings.items():
             part, _, name = section.partition(".") if self.has_names else (section, "", section)
             row = rows.get(section)
             if part not in self.sections or "." in name:
                 log.problem(file, self._expect_sections(part), row, f"[{section}]")
             elif name:
-                values = read_section(file, section, self.sections[part], given, row, log)
+                values = read_section(file, section, self.sections[part], keys, row, log)
                 if self.check:
-                    self.check(file, part, section, values, given, row, log)
+                    self.check(file, part, section, values, keys, row, log)
                 limits.append((part, name, values))
-            elif given:
+            elif keys:
                 expected = message(
                     "in_no_limit",
                     "is in no limit; expected in one, such as [{part}.volumes]",
@@ -194,7 +194,7 @@ class RuleFiles:
 
 
 def limits_one_table(rule):
-    """Return True if a rule limits a property of one table; rules of periods compare two tables."""
+    """Whether a rule limits a property of a single table; rules of periods compare two tables."""
     return bool(rule.uncertainty or rule.deviation)
 
 
@@ -262,14 +262,14 @@ def _tell_unknown(file, row, column, name, no_file, rules, log):
     log.problem(file, expected, row, column)
 
 
-def _tell_contradictions(file, part, section, values, given, row, log):
+def _tell_contradictions(file, part, section, values, keys, row, log):
     """Report keys that contradict each other or are missing, and unknown kinds of tank."""
 
     def is_given(key):
-        return key in given and not is_blank(given[key].raw)
+        return key in keys and not is_blank(keys[key].raw)
 
     def tell(key, expected):
-        place = given[key].row if key in given else row
+        place = keys[key].row if key in keys else row
         log.problem(file, expected, place or row, f"{section}.{key}")
 
     for tank in values["tanks"] or ():
