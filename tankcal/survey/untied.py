@@ -24,7 +24,6 @@ import numpy as np
 from tankcal.adjust import SD_OVER_MEDIAN, gauss_newton
 from tankcal.errors import InputError, Problem
 from tankcal.geometry.circles import taubin_circle
-from tankcal.geometry.field.components import SETTLEMENT_MODES
 from tankcal.messages import message
 from tankcal.survey.sighting import certified_m, rays
 from tankcal.units import FULL_TURN
@@ -35,6 +34,7 @@ START_SDS = (0.3, 0.3, 0.1)  # prior sds of a pose: radial and tangential (m), r
 START_OF_LINE = (0.3, 1e-3, 1e-3)  # prior sds of a pose that sees a line of the wall
 EVEN_RAD = 0.3  # sd of an assumed, even azimuth round the tank, and of its rotation
 AXIS_SDS = (0.3, 0.3, 0.02, 0.02)  # prior sds of the axis (m) and of its lean (m/m)
+WAVES = np.arange(2.0, 7.0)  # modes of settlement; few set-ups do not determine higher modes
 SETTLEMENT_SD_M = 0.02  # prior sd of the settlement waves of each mode at the top
 # sd of a hit from the surface; residuals, in sds, from which weights fall
 WALL_SD_M, FAR_SDS = 0.005, 3.0
@@ -229,7 +229,7 @@ def _fit_surface(poses, sights, pose, untied, axis, *, is_even):
     level = np.empty(len(z), dtype=int)
     # A gap larger than LEVEL_GAP_M starts a new level.
     level[order] = np.cumsum(np.diff(z[order], prepend=z[order[0]]) > LEVEL_GAP_M)
-    levels, free, waves = level.max() + 1, 3 * len(untied), 2 * len(SETTLEMENT_MODES)
+    levels, free, waves = level.max() + 1, 3 * len(untied), 2 * len(WAVES)
     # Unknowns: changes of x, y and rotation of each pose, shift and lean of the axis, waves of
     # settlement. The radii of the levels follow from them.
     lean_from, waves_from, unknowns = free + 2, free + 4, free + 4 + waves
@@ -266,7 +266,7 @@ def _fit_surface(poses, sights, pose, untied, axis, *, is_even):
             jacobian[is_of_pose, 3 * i + 2] = np.sum(normal[is_of_pose] * across, axis=1)
         jacobian[:, free:lean_from] = -normal
         jacobian[:, lean_from:waves_from] = -normal * above[:, None]
-        f = np.multiply.outer(np.arctan2(*away.T), SETTLEMENT_MODES)
+        f = np.multiply.outer(np.arctan2(*away.T), WAVES)
         by_waves = -share_of_height[:, None] * np.hstack([np.cos(f), np.sin(f)])
         jacobian[:, waves_from:unknowns] = by_waves
         jacobian[np.arange(len(z)), unknowns + level] = -1.0

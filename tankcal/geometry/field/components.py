@@ -22,9 +22,12 @@ radius then changes by
     k^2 z / R * u cos k a,
 
 which grows in proportion to the height z, so h(t, t') = 3 t t', of mean 1 over the shell. The
-amplitudes u of a foundation decrease with k and the factor k^2 increases, so modes 2 to 6 have
-equal variances. The absence of stretching follows from w_k = k v_k and v_k' = k u_k / R of the
-radial, circumferential and vertical displacements w, v, u of mode k.
+amplitudes u of a foundation decrease with k and the factor k^2 increases, so the low modes have
+equal variances. The stiffness of the shell in bending limits short waves. Their variances decrease
+as 1 / (1 + (k / 6)^4) up to mode 12. A spectrum that ends at mode 6 assigned a higher mode to other
+components, and its extrapolation into a gap of the points was wrong by more than 2 U. The absence
+of stretching follows from w_k = k v_k and v_k' = k u_k / R of the radial, circumferential and
+vertical displacements w, v, u of mode k.
 """
 
 from dataclasses import dataclass
@@ -39,8 +42,9 @@ OVALITY_MODES = np.arange(2.0, 37.0)
 OVALITY_WEIGHTS = OVALITY_MODES**-3 / np.sum(OVALITY_MODES**-3)
 SEAM_LENGTH_M = 0.4  # length of the flank of a seam along the arc
 WELD_LENGTH_M = 0.2  # length of the flank of a peak at a weld, whose total width is 0.8 m
-SETTLEMENT_MODES = np.arange(2.0, 7.0)
-SETTLEMENT_WEIGHTS = np.full(len(SETTLEMENT_MODES), 1 / len(SETTLEMENT_MODES))
+SETTLEMENT_MODES = np.arange(2.0, 13.0)
+SETTLEMENT_FALL = 1 / (1 + (SETTLEMENT_MODES / 6) ** 4)  # a foundation bends little in short waves
+SETTLEMENT_WEIGHTS = SETTLEMENT_FALL / np.sum(SETTLEMENT_FALL)
 JOINT_LENGTHS = (0.1, 0.25)  # decay lengths of drawn-in joints, in halves of a course
 LOCAL_LENGTH = 0.5  # correlation length of dents in height, in halves of a course
 BELL, BELL_SD = 1.0, 0.4  # profile of a plate: 0 for a parabola, 1 for clamped joints; and its sd
@@ -91,9 +95,9 @@ class Component:
         Name in an uncertainty budget.
     shape : str
         Form along the azimuth: "mean" (constant: the mean radius), "oval" (mode k of variance k^-3,
-        from 2 on), "settled" (modes 2 to 6 of equal variance), "seam" (the spectrum (1 + (k
-        SEAM_LENGTH_M / R)^2)^-2 from mode 2 on, cusps) or "weld" (a narrow seam at each vertical
-        weld of known azimuth; its amplitude is that of the peak).
+        from 2 on), "settled" (SETTLEMENT_MODES), "seam" (the spectrum (1 + (k SEAM_LENGTH_M /
+        R)^2)^-2 from mode 2 on, cusps) or "weld" (a narrow seam at each vertical weld of known
+        azimuth; its amplitude is that of the peak).
     common : bool
         Whether the component is common to all courses.
     orders : tuple of float, str
@@ -268,8 +272,8 @@ def joint_profiles(zeta):
 def wave_columns(azimuth_rad):
     """Return {"oval", "settled": columns (n, 2 modes) A with A A' = c}.
 
-    Mode k has the variance k^-3 for k = 2..36 ("oval"); modes 2 to 6 have equal variances
-    ("settled"). The azimuth nan denotes the mean of a full turn, to which no mode contributes.
+    Mode k has the variance k^-3 for k = 2..36 ("oval"), or SETTLEMENT_WEIGHTS ("settled"). The
+    azimuth nan denotes the mean of a full turn, to which no mode contributes.
     """
     cosines, sines = multiples(azimuth_rad, int(OVALITY_MODES[-1]))
     columns = {}
@@ -391,7 +395,7 @@ def mode_shares(modes, radius_m):
     b = radius_m / SEAM_LENGTH_M
     return {
         "oval": np.where(modes <= OVALITY_MODES[-1], modes**-3 / np.sum(OVALITY_MODES**-3), 0.0),
-        "settled": np.where(modes <= SETTLEMENT_MODES[-1], SETTLEMENT_WEIGHTS[0], 0.0),
+        "settled": np.interp(modes, SETTLEMENT_MODES, SETTLEMENT_WEIGHTS, right=0.0),
         "seam": 2 / (modes**2 + b**2) ** 2 / _seam_sum(b),
     }
 
