@@ -24,6 +24,7 @@ import numpy as np
 from tankcal.adjust import SD_OVER_MEDIAN, gauss_newton
 from tankcal.errors import InputError, Problem
 from tankcal.geometry.circles import taubin_circle
+from tankcal.geometry.field.components import SETTLEMENT_FALL, SETTLEMENT_MODES
 from tankcal.messages import message
 from tankcal.survey.sighting import certified_m, rays
 from tankcal.units import FULL_TURN
@@ -32,10 +33,10 @@ LEVEL_GAP_M = 0.15  # gap of heights that separates levels with radii of their o
 NARROW_RAD = 0.1  # range of directions of a set-up that sees a line of the wall, along its normal
 START_SDS = (0.3, 0.3, 0.1)  # prior sds of a pose: radial and tangential (m), rotation (rad)
 START_OF_LINE = (0.3, 1e-3, 1e-3)  # prior sds of a pose that sees a line of the wall
+HIGHEST_OF_EVEN = 6.0  # highest wave of settlement about set-ups of assumed azimuth
 EVEN_RAD = 0.3  # sd of an assumed, even azimuth round the tank, and of its rotation
 AXIS_SDS = (0.3, 0.3, 0.02, 0.02)  # prior sds of the axis (m) and of its lean (m/m)
-WAVES = np.arange(2.0, 7.0)  # modes of settlement; few set-ups do not determine higher modes
-SETTLEMENT_SD_M = 0.02  # prior sd of the settlement waves of each mode at the top
+SETTLEMENT_SD_M = 0.02  # prior sd of a long wave of settlement at the top
 # sd of a hit from the surface; residuals, in sds, from which weights fall
 WALL_SD_M, FAR_SDS = 0.005, 3.0
 ROUNDS, CENTRE_ROUNDS = 60, 20
@@ -229,13 +230,16 @@ def _fit_surface(poses, sights, pose, untied, axis, *, is_even):
     level = np.empty(len(z), dtype=int)
     # A gap larger than LEVEL_GAP_M starts a new level.
     level[order] = np.cumsum(np.diff(z[order], prepend=z[order[0]]) > LEVEL_GAP_M)
-    levels, free, waves = level.max() + 1, 3 * len(untied), 2 * len(WAVES)
+    levels, free, waves = level.max() + 1, 3 * len(untied), 2 * len(SETTLEMENT_MODES)
     # Unknowns: changes of x, y and rotation of each pose, shift and lean of the axis, waves of
     # settlement. The radii of the levels follow from them.
     lean_from, waves_from, unknowns = free + 2, free + 4, free + 4 + waves
     above, share_of_height = z - z.mean(), (z - z.min()) / max(np.ptp(z), LEVEL_GAP_M)
     # Priors keep undetermined parameters at their start values without constraining the others.
-    sds = np.concatenate([np.ones(free), AXIS_SDS, np.full(waves, SETTLEMENT_SD_M)])
+    wave_sds = SETTLEMENT_SD_M * np.sqrt(np.tile(SETTLEMENT_FALL, 2))
+    if is_even.any():  # short waves would absorb the error of an assumed azimuth
+        wave_sds[np.tile(SETTLEMENT_MODES > HIGHEST_OF_EVEN, 2)] = 1e-6
+    sds = np.concatenate([np.ones(free), AXIS_SDS, wave_sds])
     prior = np.diag(sds**-2.0)
     for i, number in enumerate(untied):
         prior[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] = _prior_weight(
@@ -266,7 +270,7 @@ def _fit_surface(poses, sights, pose, untied, axis, *, is_even):
             jacobian[is_of_pose, 3 * i + 2] = np.sum(normal[is_of_pose] * across, axis=1)
         jacobian[:, free:lean_from] = -normal
         jacobian[:, lean_from:waves_from] = -normal * above[:, None]
-        f = np.multiply.outer(np.arctan2(*away.T), WAVES)
+        f = np.multiply.outer(np.arctan2(*away.T), SETTLEMENT_MODES)
         by_waves = -share_of_height[:, None] * np.hstack([np.cos(f), np.sin(f)])
         jacobian[:, waves_from:unknowns] = by_waves
         jacobian[np.arange(len(z)), unknowns + level] = -1.0
