@@ -8,7 +8,7 @@
 >>> print(result.at(4.217))  # a dip between two rows
 554.6 m3, U = 1.2 m3 (k = 1.96)
 >>> print(result.delivery(2.0, 7.5))
-723.57 m3, U = 0.79 m3 (k = 1.96)
+723.56 m3, U = 0.78 m3 (k = 1.96)
 
 `result.plot("sections")` is a drawing; `tankcal.plot` names them all. Measurements without a tank:
 `tankcal.adjust_job(tankcal.load("survey", only="adjustment"))` gives points and covariance.

@@ -77,7 +77,7 @@ def run(
     >>> import tankcal
     >>> result = tankcal.run(tankcal.load("examples/silva-1995"))
     >>> print(result.at(9.5))
-    1249.8 m3, U = 1.5 m3 (k = 1.96)
+    1249.7 m3, U = 1.5 m3 (k = 1.96)
     """
     _require_job(job, "run")
     with _problems_placed(job):

@@ -99,7 +99,7 @@ class Result:
     >>> import tankcal
     >>> result = tankcal.run(tankcal.load("examples/silva-1995"), simulated=False)
     >>> print(result)
-    SILVA-1995: 1249.8 m3, U = 1.5 m3 (k = 1.96) at 9.500 m; 119 of 119 points of the wall
+    SILVA-1995: 1249.7 m3, U = 1.5 m3 (k = 1.96) at 9.500 m; 119 of 119 points of the wall
     """
 
     job: Job

@@ -33,7 +33,8 @@ LEVEL_GAP_M = 0.15  # gap of heights that separates levels with radii of their o
 NARROW_RAD = 0.1  # range of directions of a set-up that sees a line of the wall, along its normal
 START_SDS = (0.3, 0.3, 0.1)  # prior sds of a pose: radial and tangential (m), rotation (rad)
 START_OF_LINE = (0.3, 1e-3, 1e-3)  # prior sds of a pose that sees a line of the wall
-HIGHEST_OF_EVEN = 6.0  # highest wave of settlement about set-ups of assumed azimuth
+# highest wave of settlement about set-ups of assumed azimuth; sd (m) that excludes higher waves
+HIGHEST_OF_EVEN, HELD_M = 6.0, 1e-6
 EVEN_RAD = 0.3  # sd of an assumed, even azimuth round the tank, and of its rotation
 AXIS_SDS = (0.3, 0.3, 0.02, 0.02)  # prior sds of the axis (m) and of its lean (m/m)
 SETTLEMENT_SD_M = 0.02  # prior sd of a long wave of settlement at the top
@@ -238,7 +239,7 @@ def _fit_surface(poses, sights, pose, untied, axis, *, is_even):
     # Priors keep undetermined parameters at their start values without constraining the others.
     wave_sds = SETTLEMENT_SD_M * np.sqrt(np.tile(SETTLEMENT_FALL, 2))
     if is_even.any():  # short waves would absorb the error of an assumed azimuth
-        wave_sds[np.tile(SETTLEMENT_MODES > HIGHEST_OF_EVEN, 2)] = 1e-6
+        wave_sds[np.tile(SETTLEMENT_MODES > HIGHEST_OF_EVEN, 2)] = HELD_M
     sds = np.concatenate([np.ones(free), AXIS_SDS, wave_sds])
     prior = np.diag(sds**-2.0)
     for i, number in enumerate(untied):

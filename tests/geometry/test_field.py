@@ -239,7 +239,8 @@ def dense(field, zeta):
     turn = np.subtract.outer(sites.azimuth_rad, sites.azimuth_rad)
     along = {name: np.zeros((n + many, n + many)) for name in ("oval", "settled", "seam")}
     seam = (1 + (k * 0.4 / field.nominal_m) ** 2) ** -2.0
-    spectra = ("oval", k**-3.0 * (k <= 36)), ("settled", (k <= 12) / (1 + (k / 6) ** 4)), ("seam", seam)
+    settled = (k <= 12) / (1 + (k / 6) ** 4)
+    spectra = ("oval", k**-3.0 * (k <= 36)), ("settled", settled), ("seam", seam)
     for name, weights in spectra:
         used = weights > 0
         waves = sum(w * np.cos(m * turn) for m, w in zip(k[used], weights[used], strict=True))

@@ -312,7 +312,7 @@ def test_propagated_sd_by_differences_and_simulation_study(example_result, figur
 
 def test_a_result_shows_itself_in_a_line_and_a_path_is_no_job(example_result):
     assert repr(example_result).startswith(
-        "<tankcal.Result of SILVA-1995: 1249.8 m3, U = 1.5 m3 (k = 1.96) at "
+        "<tankcal.Result of SILVA-1995: 1249.7 m3, U = 1.5 m3 (k = 1.96) at "
     )
     with pytest.raises(TypeError, match="expected a Job"):
         run("examples/silva-1995")
