@@ -171,4 +171,4 @@ def test_sheet_and_certificate_state_the_levels(tmp_path):
     tables = [block for block in paper_blocks(tmp_path / "record.json") if block["kind"] == "table"]
     (rows_on_paper,) = (block["rows"] for block in tables if "Nível" in str(block["columns"]))
     assert [row[0] for row in rows_on_paper] == [row[0] for row in cells]
-    assert rows_on_paper[4][1:5] == ["9,000", "1,200", "1.035,312", "0,59"]
+    assert rows_on_paper[4][1:5] == ["9,000", "1,200", "1.035,312", "0,60"]

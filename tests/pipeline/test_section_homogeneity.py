@@ -56,7 +56,7 @@ def test_published_sections_are_not_homogeneous(example_result):
     assert first.p == pytest.approx(2 * chi2.cdf(first.chi2, 21), rel=1e-9)
     assert [one.section for one in found.sections if one.differs] == ["1"]
     warnings = warn_of_sections(example_result.job, example_result.wall)
-    assert "0.20 in section 1 and 1.91 in section 5" in str(warnings[0])
+    assert "0.20 in section 1 and 1.68 in section 5" in str(warnings[0])
 
 
 def test_the_record_keeps_the_tests(example_result):
@@ -105,7 +105,7 @@ def test_a_missing_point_leaves_every_outline_to_the_same_estimator(tmp_path):
     moved = [
         np.ptp(a.radius_m(even) - b.radius_m(even)) for a, b in zip(before, after, strict=True)
     ]
-    assert max(moved) < 0.003
+    assert max(moved) < 0.014 / 4  # a quarter of the noise
     assert np.ptp(after[1].radius_m(even)) == pytest.approx(
         np.ptp(before[1].radius_m(even)), abs=0.002
     )
