@@ -283,6 +283,8 @@ def test_a_letterhead_is_text_and_a_picture():
 
 
 def test_blocks_of_the_report_are_known_to_the_exporter(found):
+    # With "copy", a whole notebook shows a notice in place of the lines of signature.
+    found = [{key: value for key, value in block.items() if key != "copy"} for block in found]
     cells = [
         nbformat.v4.new_code_cell(
             "x", outputs=[nbformat.v4.new_output("display_data", data={blocks.MIME: block})]

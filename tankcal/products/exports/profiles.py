@@ -416,7 +416,11 @@ _TEXTS = (
         "system",
     ),
     message("profile_every_row", "Every row, decimal point, comma"),
-    message("profile_unchecked", "Not checked with its manual"),
+    message(
+        "profile_unfit",
+        "Does not fit a console of 20 points: such a console takes volumes only, at 5, 10, ... 100 "
+        "% of the diameter. Enter volumes at those heights from the table",
+    ),
     message("profile_any", "any program that reads CSV"),
     message("profile_russian", "a Russian level meter"),
     message("profile_aveva_centimetres", "AVEVA (increments of 1/100 m)"),
