@@ -77,6 +77,7 @@ def test_the_offset_scale_and_angles_of_the_set_up_are_applied(tmp_path):
     assert np.max(np.abs(result.table.volume_m3 - exact)) < 1e-6 * exact[-1]
 
 
+@pytest.mark.slow
 def test_hits_on_the_flat_ends_are_rejected(tmp_path):
     parts = exact_parts("horizontal")
     ends = [[0.3, LENGTH_M / 2, 0.4], [-0.5, LENGTH_M / 2, 0.1], [0.2, -LENGTH_M / 2, -0.6]]
@@ -288,6 +289,7 @@ def test_hits_on_a_part_of_the_cylinder_are_warned_of(tmp_path):
     assert any("% of the length of the cylinder" in text for text in texts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["horizontal", "sphere"])
 def test_a_record_and_its_sheet(kind, tmp_path):
     parts = exact_parts(kind)

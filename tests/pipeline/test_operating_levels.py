@@ -147,6 +147,7 @@ def test_a_level_in_the_critical_zone_is_marked(tmp_path):
     assert remark == ["not for use"]
 
 
+@pytest.mark.slow
 def test_a_record_without_levels_has_no_such_heading(tmp_path):
     _, with_levels = limits_of(job_with(tmp_path / "with"))
     without = to_plain(record_of(tankcal.run(job_with(tmp_path / "without", {}))))
@@ -156,6 +157,7 @@ def test_a_record_without_levels_has_no_such_heading(tmp_path):
         assert texts.count("Operating levels") == count
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*extension is not supported:UserWarning")
 def test_sheet_and_certificate_state_the_levels(tmp_path):
     rows, record = limits_of(job_with(tmp_path, **{"table.language": "pt-BR"}))

@@ -596,6 +596,7 @@ def test_workbook_has_the_main_result_and_the_remarks(tmp_path, language):
     assert texts[at + 1].replace(",", ".").startswith("1.48")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("pdftotext") is None, reason="needs pdftotext")
 def test_long_notes_keep_the_end_mark_with_the_signatures(tmp_path):
     """Notes of 9 to 13 lines: the end of page 2 falls between signatures and end mark."""
@@ -706,6 +707,7 @@ def test_readings_changed_with_all_their_results_are_detected_by_the_input_files
     assert codes == {"verify_input_changed"}
 
 
+@pytest.mark.slow
 def test_values_of_the_record_are_detected_by_the_record(tmp_path, record_folder):
     """A forged radius or reference height agrees with gauge.json; the record contradicts it."""
     gauge = {"record": str(record_folder / "r"), "supported_by": "shell", "highest_m": 9}

@@ -109,6 +109,7 @@ def test_coverage_of_the_corrections_of_a_gauge_on_the_shell(
     assert share.min() >= 0.92  # 300 draws: 0.95 less 2.4 standard errors
 
 
+@pytest.mark.slow
 def test_the_certificate_of_a_gauge_on_the_shell_is_verified(tmp_path, record_folder, capsys):
     rows, _ = simulated(np.random.default_rng(1), dip_mm=0.5, gauge_mm=0.5)
     folder = write(tmp_path / "g", rows, "level,dip_m,gauge_m,tape_c",

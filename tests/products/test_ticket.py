@@ -548,6 +548,7 @@ def test_command_speaks_the_language(settings, example_record, language, capsys)
     assert "{" not in text
 
 
+@pytest.mark.slow
 def test_output_replaces_only_a_file_of_the_command(settings, example_record, tmp_path, capsys):
     path = settings(("dip_m = 9.0", "dip_m = 8.5"), ('"T-1"', '"=T-1"'))
     out = tmp_path / "out.csv"
@@ -569,6 +570,7 @@ def test_output_replaces_only_a_file_of_the_command(settings, example_record, tm
     assert other.read_text(encoding="utf-8") == "{}"
 
 
+@pytest.mark.slow
 def test_failed_output_leaves_the_former_file(settings, example_record, tmp_path, monkeypatch):
     path = settings(("dip_m = 9.0", "dip_m = 8.5"))
     out = tmp_path / "out.csv"
@@ -586,6 +588,7 @@ def test_failed_output_leaves_the_former_file(settings, example_record, tmp_path
     assert sorted(p.name for p in tmp_path.iterdir() if p.suffix != ".toml") == ["out.csv"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", ["pt-BR", "es"])
 @pytest.mark.parametrize("correction", ["CNP-6-70", "OIML-R22", "GPA-TP27"])
 def test_correction_is_named_in_the_language(

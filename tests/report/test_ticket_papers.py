@@ -147,6 +147,7 @@ def test_assumed_uncertainties_are_marked(tank):
     assert words["origins"]["memory"].replace("\xa0", " ") in text.replace("\xa0", " ")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_the_fullest_ticket_is_a_single_page(language, tmp_path):
     """With a letterhead, floating roof, warnings and long texts, in each language."""
@@ -164,6 +165,7 @@ def test_the_fullest_ticket_is_a_single_page(language, tmp_path):
     assert set(reader.attachments) == {"ticket.json", "ticket.xlsx", "ticket.xml"}
 
 
+@pytest.mark.slow
 def test_degrees_of_freedom_of_the_table_reach_the_quantities():
     """Only the table has finite degrees of freedom, 8; other inputs are negligible here."""
     names = ("u_dip_mm", "u_tape_ppm", "u_water_dip_mm", "u_temperature_k", "u_thermometer_k",
@@ -266,6 +268,7 @@ def test_documents_are_made_again_in_another_language(tank, tmp_path, capsys):
     capsys.readouterr()
 
 
+@pytest.mark.slow
 def test_a_document_needs_number_and_date():
     with pytest.raises(InputError) as refused:
         document_file(read_tickets(_cylinder(), LONG | {"ticket": {}}))
@@ -283,6 +286,7 @@ def test_folder_with_other_files_is_left_alone(tank, tmp_path, capsys):
     assert "letter.txt" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_each_ticket_of_a_file_has_its_document(tank, tmp_path, capsys):
     folder, rows = tmp_path / "out", tmp_path / "rows.csv"
     ticket = ["ticket", str(tank / "results"), str(tank / "ticket.toml"), "--tickets", str(rows)]
@@ -342,6 +346,7 @@ def test_folders_of_tickets_are_checked_before_the_first_document(tank, tmp_path
     assert [path.name for path in folder.rglob("*")] == ["B", "letter.txt"]
 
 
+@pytest.mark.slow
 def test_the_decision_of_a_comparison():
     saved = to_plain(ticket_file(read_tickets(_cylinder(), LONG)))
     assert saved["comparison"]["agrees"] is (abs(saved["comparison"]["e_n"]) <= 1)
@@ -351,6 +356,7 @@ def test_the_decision_of_a_comparison():
     assert "not decided" in comparison_text(TicketPaper(again))
 
 
+@pytest.mark.slow
 def test_hostile_texts_stay_texts(tmp_path):
     hostile = {**LONG, "ticket": LONG["ticket"] | {"by": "=HYPERLINK(1)", "note": "<script>x" * 9}}
     write_ticket(document_file(read_tickets(_cylinder(), hostile)), tmp_path / "out")
@@ -360,6 +366,7 @@ def test_hostile_texts_stay_texts(tmp_path):
     assert "<script>x" not in (tmp_path / "out" / "ticket.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_stock_has_no_column_of_an_opening(tmp_path):
     stock = {section: values for section, values in LONG.items()
              if section not in ("opening", "compared")}  # fmt: skip
@@ -372,6 +379,7 @@ def test_a_stock_has_no_column_of_an_opening(tmp_path):
     assert {row["state"] for row in saved["quantities"]} == {"closing"}
 
 
+@pytest.mark.slow
 def test_rooms_are_on_the_page_and_in_the_xml(tmp_path):
     table = replace(_cylinder(), levels={"maximum_m": 11.0, "pump_suction_m": 0.5})
     tickets = read_tickets(table, LONG)
@@ -390,6 +398,7 @@ def test_rooms_are_on_the_page_and_in_the_xml(tmp_path):
     assert "Espaço disponível" in reader.pages[0].extract_text()
 
 
+@pytest.mark.slow
 def test_a_document_is_of_a_single_ticket(tmp_path):
     rows = tmp_path / "rows.csv"
     rows.write_text("ticket;sw_percent\nA;0,1\nB;0,2\n", encoding="utf-8")

@@ -409,6 +409,7 @@ def test_a_typed_zero_is_an_entry(result, paper, quantity):
     assert {written.value, written.uncertainty} <= set(printed(quantity.answer.value))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("place", "typed"),
     [
@@ -438,6 +439,7 @@ def test_a_missing_choice_is_asked_for_in_words(paper, quantity):
     assert quantity.answer.value == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("typed", ["<b>8</b>", "1.2.3", "8 m", "1.234,5", "nan", "9" * 400])
 def test_an_entry_that_is_no_number_is_refused(quantity, typed):
     quantity.entries["closing.dip_m"].value = typed
