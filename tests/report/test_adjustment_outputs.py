@@ -738,7 +738,7 @@ def test_strict_writes_nothing_when_the_global_test_fails(doubtful, capsys):
 def test_strict_holds_for_the_whole_run(doubtful, monkeypatch, capsys):
     adjustment = adjust_job(tankcal.load(doubtful))
     monkeypatch.setattr(tankcal, "run", lambda *job, **told: SimpleNamespace(adjustment=adjustment))
-    assert main(["run", str(doubtful), "--strict", "--quiet"]) == 3
+    assert main(["run", str(doubtful), "--strict", "--quiet", "--no-papers"]) == 3
     assert "the global test of the adjustment failed" in capsys.readouterr().err
     assert not (doubtful / "results").exists()
 
