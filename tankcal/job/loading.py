@@ -13,7 +13,6 @@ from tankcal.job.building import job_of
 from tankcal.job.contract import COLUMNS, KEYS
 from tankcal.job.folder import read_folder, results_given_as_job
 from tankcal.job.model import Job
-from tankcal.job.sheets import read_workbook
 from tankcal.job.tables import SETTINGS_FILE, TABLES, WORKBOOK_FILE, Log
 from tankcal.messages import message
 from tankcal.methods.base import methods
@@ -168,6 +167,8 @@ def filled_workbook(folder, log):
     book = folder / WORKBOOK_FILE
     if not ((folder / SETTINGS_FILE).is_file() and book.is_file()):
         return None
+    from tankcal.job.sheets import read_workbook
+
     log_of_texts = Log()
     texts, sheets = read_folder(folder, log_of_texts), read_workbook(book, Log())
     if sheets is None or log_of_texts.problems or texts.settings is None:

@@ -39,7 +39,7 @@ from tankcal.methods.inside_hits import solid as inside_solid
 from tankcal.methods.lines import warnings
 from tankcal.methods.lines import warnings as lines_warnings
 from tankcal.methods.liquid import columns as liquid_columns
-from tankcal.methods.liquid import figures as liquid_figures
+from tankcal.methods.liquid import facts as liquid_facts
 from tankcal.methods.strapping import tape_warnings
 from tankcal.pipeline import cluster, scanned_solids
 from tankcal.pipeline import overruling_effects as overruling
@@ -554,7 +554,7 @@ LIMITS += [
         "distinguish from it (())",
         [liquid_adjustment.LEAST, liquid_adjustment.ALIKE],
     ),
-    ("docs/liquid.md", "Above () U the certificate states", [liquid_figures.HIDDEN_U]),
+    ("docs/liquid.md", "Above () U the certificate states", [liquid_facts.HIDDEN_U]),
     (
         "docs/liquid.md",
         "() mm in () m changes the head by () % of its value",
@@ -998,7 +998,7 @@ LIMITS += [
         [plausibility.TARGET_MM["flat"][1]],
     ),
     ("docs/plausibility.md", "A departure within () in () is not detected", ONE_IN_500),
-    ("docs/liquid-papers.md", "changes a volume by more than () U", [liquid_figures.HIDDEN_U]),
+    ("docs/liquid-papers.md", "changes a volume by more than () U", [liquid_facts.HIDDEN_U]),
     (
         "docs/inspection.md",
         "gap under a board of () mm centred on a vertical or a horizontal weld: the largest gap "

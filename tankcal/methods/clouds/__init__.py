@@ -118,7 +118,7 @@ class CloudsMethod(Method):
         return figures
 
     def facts(self):
-        from tankcal.methods.clouds.figures import FACTS
+        from tankcal.methods.clouds.facts import FACTS
 
         return FACTS
 

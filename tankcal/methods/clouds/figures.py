@@ -8,7 +8,6 @@ from matplotlib.patches import Rectangle
 
 from tankcal.methods.clouds import tables
 from tankcal.report.plots.style import GREY, WIDTH, Drawing, styled
-from tankcal.report.tables.table import Column
 
 FULL_COLOUR = 98  # percentile of absolute deviations that has the last colour
 LEAST_LIMIT_MM = 0.5  # smallest deviation of the last colour
@@ -149,25 +148,3 @@ def blocks_of_tables(paper):
 def cells_of_map(record):
     """Number of wall cells with a deviation in the map."""
     return int(np.isfinite(departures_mm(record)).sum())
-
-
-# ---- fact of a scanned wall on certificate and workbook
-
-
-def _scanned(paper, row):
-    """Return a sentence on the point clouds with their numbers of points, or None."""
-    clouds = paper.record.get("clouds")
-    if not clouds:
-        return None
-    scans = clouds["scans"]
-    return paper.word(
-        "texts.cloud_method",
-        scans=len(scans),
-        files=len(clouds["files"]),
-        wall=sum(scan["of_wall"] for scan in scans),
-        read=sum(scan["delivered"] for scan in scans),
-        means=sum(scan["readings"] for scan in scans),
-    )
-
-
-FACTS = (Column("scanned", text=_scanned, sheet=True),)

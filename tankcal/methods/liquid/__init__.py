@@ -143,22 +143,22 @@ class LiquidMethod(Method):
         return figures
 
     def facts(self):
-        from tankcal.methods.liquid.figures import FACTS
+        from tankcal.methods.liquid.facts import FACTS
 
         return FACTS
 
     def unchecked(self, paper):
-        from tankcal.methods.liquid.figures import hidden_errors
+        from tankcal.methods.liquid.facts import hidden_errors
 
         return hidden_errors(paper)
 
     def field_blocks(self, paper, texts):
-        from tankcal.methods.liquid.figures import blocks_of_liquid
+        from tankcal.methods.liquid.field_sheets import blocks_of_liquid
 
         return blocks_of_liquid(paper, texts)
 
     def field_columns(self, paper, columns):
-        from tankcal.methods.liquid.figures import columns_of_batches
+        from tankcal.methods.liquid.field_sheets import columns_of_batches
 
         return columns_of_batches(paper, columns)
 
