@@ -33,6 +33,7 @@ from tankcal.record.columns import rows_of
 from tankcal.report import attachments, outputs, workbook
 from tankcal.report.document import blocks_of
 from tankcal.report.notebook import execute, join_templates
+from tankcal.report.outputs import csv_files
 from tankcal.report.outputs.csv_files import write_csv
 from tankcal.report.paper import Paper
 from tankcal.report.papers import parts_without_content
@@ -382,7 +383,7 @@ def test_csv_files_are_the_record_in_their_units(only):
 @pytest.mark.slow
 def test_angles_are_degrees_with_residuals_in_seconds(station, tmp_path):
     _, record, _ = station
-    outputs.tables.write_tables(record, tmp_path)
+    csv_files.write_tables(record, tmp_path)
     table = pd.read_csv(tmp_path / "residuals.csv")
     angles = table[table.kind == "direction"]
     assert set(angles.value_unit) == {"deg"}

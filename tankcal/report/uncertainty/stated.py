@@ -75,7 +75,7 @@ def _dips(row):
 
 def limit_rows(record):
     """Return the volumes of the operating levels, as `stated_rows` with the key tank_limit."""
-    budgets = {_dips(budget): budget for budget in record["budgets"]}
+    budgets = {_dips(budget): budget for budget in record.get("budgets", ())}
     return [
         _stated(record, budgets[_dips(limit)]) | {"tank_limit": limit["code"]}
         for limit in record.get("limits") or ()
