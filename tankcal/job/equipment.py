@@ -12,7 +12,7 @@ from tankcal.job.fields import is_blank
 from tankcal.job.folder import MAX_SETTINGS_BYTES
 from tankcal.job.folder import read_register as parse_register
 from tankcal.job.model.settings import Equipment
-from tankcal.job.tables import fingerprint, nearest, read_bytes
+from tankcal.job.tables import fingerprint, nearest, read_beside
 from tankcal.messages import message
 
 EQUIPMENT, ENDING = "equipment", ".toml"
@@ -34,9 +34,12 @@ def add_shared_register(raw, log):
         )
         log.problem(place[0], expected, *place[1:])
         return raw
-    path = raw.folder / name
     # A job may come from somebody else: only TOML files at a relative place are read.
-    if not name.lower().endswith(ENDING) or Path(name).is_absolute() or not path.is_file():
+    if (
+        not name.lower().endswith(ENDING)
+        or Path(name).is_absolute()
+        or not (raw.folder / name).is_file()
+    ):
         expected = message(
             "no_equipment_register",
             "found {name}; expected a TOML file at a place relative to the job, such as "
@@ -45,11 +48,11 @@ def add_shared_register(raw, log):
         )
         log.problem(place[0], expected, *place[1:])
         return raw
-    data = read_bytes(path, log, MAX_SETTINGS_BYTES)
-    register = None if data is None else parse_register(path.name, data, log, EQUIPMENT)
-    # `tankcal verify` finds the file by its place relative to the job.
-    file = fingerprint(Path(name).as_posix(), data) if data is not None else None
-    files = (*raw.files, file) if file else raw.files
+    name = Path(name).as_posix()  # `tankcal verify` finds the file by this place
+    data, register, files = read_beside(raw.folder, name, log, MAX_SETTINGS_BYTES), None, raw.files
+    if data is not None:
+        register = parse_register(name, data, log, EQUIPMENT)
+        files = (*files, fingerprint(name, data))
     return replace(raw, registers=raw.registers | {EQUIPMENT: register}, files=files)
 
 

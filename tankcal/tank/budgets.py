@@ -67,7 +67,7 @@ class Budget:
         return self.k * max(self.u_m3**2 - self.table_u_m3**2, 0.0) ** 0.5
 
     @property
-    def volume_text(self):
+    def summary(self):
         """Dip, or dips, and volume with U in one line (str)."""
         dips = (
             f"{self.high_m:g} m" if self.low_m is None else f"{self.low_m:g} to {self.high_m:g} m"
@@ -79,10 +79,10 @@ class Budget:
             f"{100 * line.share:6.1f} %  {line.contribution:9.4f} m3  {self._input_text(line)}"
             for line in self._ordered
         ]
-        return "\n".join([self.volume_text, *lines])
+        return "\n".join([self.summary, *lines])
 
     def __repr__(self) -> str:
-        return f"<Budget of {self.volume_text}>"
+        return f"<Budget of {self.summary}>"
 
     def _repr_html_(self) -> str:
         rows = [
@@ -96,7 +96,7 @@ class Budget:
             for line in self._ordered
         ]
         headings = ["input", "u", "unit", "contribution, m3", "share, %"]
-        return table_html(self.volume_text, headings, rows)
+        return table_html(self.summary, headings, rows)
 
     @property
     def _ordered(self):

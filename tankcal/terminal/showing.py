@@ -116,7 +116,7 @@ def prepare_for_small_work():
         import resource
 
         limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-        if limit not in (resource.RLIM_INFINITY, -1) and limit < LEAST_MEMORY_B:
+        if limit != resource.RLIM_INFINITY and limit < LEAST_MEMORY_B:
             raise MemoryError
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     gc.set_threshold(OBJECTS_AT_ONCE)

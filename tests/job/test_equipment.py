@@ -101,6 +101,18 @@ def test_bad_registers_have_a_line_each(keys, register, place, expected, tmp_pat
     assert all(part in line for part, line in zip(expected, lines, strict=True))
 
 
+def test_a_link_out_of_the_job_is_not_followed(tmp_path):
+    """A message on its content would show a line of a file that the job does not own."""
+    (tmp_path / "secret").write_text("password\n", encoding="utf-8")
+    folder = write_job(tmp_path, survey=['equipment_register = "lab.toml"'])
+    (folder / "lab.toml").symlink_to(tmp_path / "secret")
+    with pytest.raises(InputError) as refused:
+        tankcal.load(folder)
+    [line] = str(refused.value).splitlines()
+    assert "symbolic link" in line
+    assert "password" not in line
+
+
 @pytest.mark.slow
 def test_equipment_is_on_the_certificate(tmp_path):
     pypdf = pytest.importorskip("pypdf")

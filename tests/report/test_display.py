@@ -39,7 +39,7 @@ def test_text_of_a_user_is_no_markup():
 
 def test_shown_result_budget_and_delivery_agree_with_table(example_result):
     top = example_result.table.height_m[-1]
-    assert example_result.budget().volume_text.endswith(str(example_result.at(top)))
+    assert example_result.budget().summary.endswith(str(example_result.at(top)))
     delivered = str(example_result.budget(7.5, 2.0)).splitlines()
     assert delivered[0].endswith(str(example_result.delivery(2.0, 7.5)))
     shares = [float(line.partition("%")[0]) for line in delivered[1:]]
