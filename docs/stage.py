@@ -24,6 +24,7 @@ MATH = re.compile(r"(?<![\\$])\$([^$\n]+)\$(?!\$)")
 RESULTS = ROOT / "build/benchmarks.json"
 PAGES = (
     "docs/*.md",
+    "docs/studies/*.md",
     "docs/journal/*.md",
     "CHANGELOG.md",
     "CONTRIBUTING.md",

@@ -8,7 +8,7 @@ freedom are the smallest among the inputs (`together_dof`). If the covariance of
 estimated jointly, the degrees of freedom are equal, and c' S c has a chi-square distribution with
 this number of degrees of freedom (S has a Wishart distribution). For unequal degrees of freedom, no
 rule is both safe and short. Of five simulated rules, the smallest value fell short least often, for
-every method of estimating the variances and the correlation (docs/uncertainty.md).
+every method of estimating the variances and the correlation (docs/studies/propagation.md).
 
 A budget lists the contribution of each input, and its potential for improvement.
 

@@ -196,7 +196,8 @@ def stated_delivery(table, simulation, low_m, high_m):
 
     A delivery that was not simulated has the U of the law of propagation, and its interval states
     this. Down to the empty tank, such a delivery is the volume at its upper dip, and has the U of
-    that volume: the law of propagation would let errors cancel that do not (docs/uncertainty.md).
+    that volume: the law of propagation would let errors cancel that do not
+    (docs/studies/propagation.md).
 
     Parameters
     ----------

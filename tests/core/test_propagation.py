@@ -442,7 +442,7 @@ def test_independent_degrees_of_freedom():
 
 
 def test_correlated_inputs_of_unequal_degrees_of_freedom():
-    """The least of them: a rule by shares of the variance did not hold (docs/uncertainty.md)."""
+    """The least: a rule by shares of the variance did not hold (docs/studies/propagation.md)."""
 
     def dof(u, nu, r):
         inputs = [Input(n, standard(s, dof=d)) for n, s, d in zip("ab", u, nu, strict=True)]
@@ -503,8 +503,8 @@ def test_the_least_holds_in_random_groups(figure):
     """Simulation of two to five inputs: contributions of both signs, dof 2 to 50, any correlation.
 
     The estimates of the variances are made apart, come from the same residuals, or are the same
-    quantile of chi-square; no rule draws the truth. docs/uncertainty.md has the rules that were
-    tried, and the lowest of 320 groups, 0.934.
+    quantile of chi-square; no rule draws the truth. docs/studies/propagation.md has the rules
+    that were tried, and the lowest of 320 groups, 0.934.
     """
     rng, count = np.random.default_rng(8), 20_000
     lowest = 1.0

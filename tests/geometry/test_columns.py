@@ -137,7 +137,7 @@ def test_seams_at_random_places_are_within_u(shape, tmp_path, figure):
         off.append(error / expanded)
     figure(f"seams of 40 mm, {shape}: errors in U", " ".join(f"{one:.2f}" for one in off))
     least, depth_mm = figures_of(
-        "docs/uncertainty.md",
+        "docs/studies/wall-model.md",
         "With it, more than () % of the totals with two seams of () mm at random places are within",
     )
     assert depth_mm == "40"
@@ -154,7 +154,7 @@ def test_the_budget_has_seams_that_no_column_meets(tmp_path):
     seams = next(one for one in sources if one.kind == "seams")
     hidden = hidden_seams_m(wall.field.sites.azimuth_rad, shape.radius_m)
     printed = figures_of(
-        "docs/uncertainty.md",
+        "docs/studies/wall-model.md",
         "On R 7.5 m this is () mm of the mean radius (() ppm) with () columns or fewer, () mm (() "
         "ppm) with ()",
     )
@@ -206,7 +206,8 @@ def test_seams_and_fittings_that_look_alike_are_within_u(tmp_path, figure):
         )
         figure(f"{kind}: held, mean U over 1.96 rms errors", f"{held:.3f} {wide:.2f}")
         (stated,) = figures_of(
-            "docs/uncertainty.md", "with both and with neither, () % of the totals are within U"
+            "docs/studies/wall-or-fitting.md",
+            "with both and with neither, () % of the totals are within U",
         )
         least = int(stated) / 100
         assert held > least - 3 * np.sqrt(least * (1 - least) / len(off))

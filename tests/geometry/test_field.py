@@ -601,7 +601,7 @@ def test_known_welds_tell_peaks_from_the_wall_between(figure):
     figure("welds under every third line, volume off without and with them, ppm", np.round(off, 1))
     assert abs(off[1]) < 0.4 * abs(off[0])
     peak_mm, over_m, least, most = figures_of(
-        "docs/uncertainty.md",
+        "docs/studies/wall-model.md",
         "every third line is on a weld that peaks by () mm over () m. The volume is off by more "
         "than () ppm without the welds and by less than () ppm with them",
     )

@@ -135,7 +135,7 @@ def test_pipes_and_a_ladder_beside_a_seam_go():
     xyz = np.column_stack([(survey.radius_m * around).T, z])
     rejected = find_shell(xyz, wall.course_m * np.arange(wall.courses + 1), 20.0).reason != ""
     (least,) = figures_of(
-        "docs/uncertainty.md",
+        "docs/studies/wall-or-fitting.md",
         "Of the points on pipes and ladders in such scans more than () % are rejected",
     )
     assert rejected[hit].mean() > int(least) / 100
@@ -157,7 +157,7 @@ def test_seams_of_every_shape_are_in_the_table(tmp_path, figure):
     told = f"{np.mean(held):.3f} {np.mean(lost):.3f} {np.max(lost):.3f}"
     figure("seams of 40 mm: held, mean and largest share rejected", told)
     most, least = figures_of(
-        "docs/uncertainty.md",
+        "docs/studies/wall-or-fitting.md",
         "Less than () % of their points are rejected in the mean, and more than () % of the totals "
         "are within U",
     )

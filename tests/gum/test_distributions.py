@@ -199,7 +199,7 @@ def test_thermal_expansion_of_nist():
 
     by_gum = propagate(alpha, Inputs([Input(n, t) for n, t in zip(declared, ts, strict=True)]))
     printed = figures_of(
-        "docs/uncertainty.md",
+        "docs/studies/propagation.md",
         "example E13 of NIST TN 1900: u = ()·10⁻⁶ 1/K by the law of propagation and ()·10⁻⁶ 1/K by "
         "Monte Carlo",
     )

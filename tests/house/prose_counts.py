@@ -111,6 +111,7 @@ def list_files():
     """Paths of the English pages and of the modules of the package."""
     pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]
     pages += [path for path in (ROOT / "docs").glob("*.md") if path.name not in FOREIGN]
+    pages += (ROOT / "docs/studies").glob("*.md")
     return sorted(pages) + sorted((ROOT / "tankcal").rglob("*.py"))
 
 

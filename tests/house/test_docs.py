@@ -13,7 +13,14 @@ from line_references import PAGE, definition_line, references
 from page_sessions import FENCE
 
 ROOT = Path(__file__).parents[2]
-PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("examples/*/*.md")])
+PAGES = sorted(
+    [
+        *ROOT.glob("*.md"),
+        *ROOT.glob("docs/*.md"),
+        *ROOT.glob("docs/studies/*.md"),
+        *ROOT.glob("examples/*/*.md"),
+    ]
+)
 LINK = re.compile(r"\]\(([^()\s]+)\)")
 NAME = re.compile(r"`(tankcal(?:\.\w+)+)")
 FILE = re.compile(r"`((?:tankcal|tests|report_templates|docs)/[\w./*-]*)`")
@@ -118,6 +125,8 @@ def test_the_page_of_the_structure_lists_every_layer():
 def test_first_page_lists_every_page():
     listed = set(LINK.findall((ROOT / "docs/index.md").read_text(encoding="utf-8")))
     assert {page.name for page in ROOT.glob("docs/*.md")} - {"index.md"} <= listed
+    studies = set(LINK.findall((ROOT / "docs/studies/index.md").read_text(encoding="utf-8")))
+    assert {page.name for page in ROOT.glob("docs/studies/*.md")} - {"index.md"} <= studies
 
 
 def printed_patterns():

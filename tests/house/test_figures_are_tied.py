@@ -13,7 +13,14 @@ from page_sessions import ROOT
 from tankcal.job.plausibility_table import TABLE
 
 GENERATED = {"docs/benchmarks.md", "docs/job-format.md", "docs/saved-keys.md"}
-PAGES = sorted({f"docs/{path.name}" for path in ROOT.glob("docs/*.md")} - GENERATED)
+PAGES = sorted(
+    {
+        str(path.relative_to(ROOT))
+        for pattern in ("*.md", "studies/*.md")
+        for path in ROOT.glob(f"docs/{pattern}")
+    }
+    - GENERATED
+)
 TABLES = {  # phrases of tables that another test compares with the code as a whole
     "docs/plausibility.md": [
         text for row in TABLE for text in (row.what, row.expected, row.slip, row.against) if text

@@ -737,68 +737,77 @@ LIMITS += [
         [PERCENT * cloud_bottom.ROOF_SHARE],
     ),
     (
-        "docs/uncertainty.md",
+        "docs/studies/wall-model.md",
         "is a bulge of () b rms, or of () b if it is a parabola",
         [math.sqrt((16 / 21) ** 2 / 5 + (8 / 35) ** 2 / 9), math.sqrt((2 / 3) ** 2 / 5)],
     ),
     (
-        "docs/uncertainty.md",
+        "docs/studies/wall-model.md",
         "corresponds to a barrel of () mm, and the mean of its variance to () mm",
         [MM * BARREL_M, MM * BARREL_M * math.exp(COMPONENT["common bulge"].log_sd ** 2 / 4)],
     ),
     (
-        "docs/uncertainty.md",
+        "docs/studies/wall-model.md",
         "have a prior correlation of (). The correlation is () for joints and seams",
         [components.WORKMANSHIP, components.WORKMANSHIP + components.SHRINKAGE],
     ),
+    ("docs/uncertainty.md", "at a level of () %", [PERCENT * adjust.ALPHA]),
     (
-        "docs/uncertainty.md",
+        "docs/studies/wall-model.md",
         "exceeds (), its critical value at () %",
         [adjust.CRITICAL, PERCENT * adjust.ALPHA],
     ),
     (
-        "docs/uncertainty.md",
+        "docs/studies/wall-model.md",
         "corresponds to two seams of () mm, () m wide",
         [MM * estimate.DEPTH_M, estimate.WIDTH_M],
     ),
-    ("docs/uncertainty.md", "(1 - (w/s)²), w = () m", [estimate.WIDTH_M]),
+    ("docs/studies/wall-model.md", "(1 - (w/s)²), w = () m", [estimate.WIDTH_M]),
     (
-        "docs/uncertainty.md",
+        "docs/studies/wall-model.md",
         "are sought within () mm of it, or within () % of the radius if that is more. A buckle or "
         "a settled shell of a small tank departs from the cylinder by more than () %",
         [MM * shell.LEAST_BAND_M, PERCENT * shell.WALL_BAND, PERCENT * shell.WALL_BAND],
     ),
     (
-        "docs/uncertainty.md",
+        "docs/studies/coverage.md",
         "pipes that stand off by less than () mm. It also applies to pipes among more than () "
         "points near the wall or fewer than () columns",
         [MM * blunders.LEAST_M, sites.MOST_SITES, blunders.FEWEST],
     ),
     (
-        "docs/uncertainty.md",
+        "docs/studies/coverage.md",
         "exceed its prior median of () mm rms",
         [MM * COMPONENT["common taper"].median_m],
     ),
     (
-        "docs/uncertainty.md",
+        "docs/studies/coverage.md",
         "measured at one height, () % of the course or more off its middle",
         [PERCENT * wall_checks.OFF_MIDDLE],
     ),
-    ("docs/uncertainty.md", "if one of them fails at () %", [PERCENT * wall_checks.LEVEL]),
-    ("docs/uncertainty.md", "all sections together at () %", [PERCENT * wall_checks.LEVEL]),
     (
-        "docs/uncertainty.md",
+        "docs/studies/section-noise.md",
+        "if one of them fails at () %",
+        [PERCENT * wall_checks.LEVEL],
+    ),
+    (
+        "docs/studies/section-noise.md",
+        "all sections together at () %",
+        [PERCENT * wall_checks.LEVEL],
+    ),
+    (
+        "docs/studies/wall-or-fitting.md",
         "with a median of () mm off the wall at most",
         [MM * patches.FARTHEST_M],
     ),
     (
-        "docs/uncertainty.md",
+        "docs/studies/wall-or-fitting.md",
         "is rejected if the jump is () mm, 5 times the scatter about the smooth form, and () "
         "standard deviations",
         [MM * blunders.LEAST_M, blunders.LEAST_W],
     ),
     (
-        "docs/uncertainty.md",
+        "docs/studies/wall-model.md",
         "A point is rejected if it is () mm and () standard deviations off the wall shown by the "
         "other points (with more than 600 points, off the median of () neighbours). It is also "
         "rejected if it is farther than () % of the radius and () mm",
@@ -811,7 +820,7 @@ LIMITS += [
         ],
     ),
     (
-        "docs/uncertainty.md",
+        "docs/decision-rules.md",
         "reference height () mm; at most () years",
         [
             RECALIBRATION["reference_height"]["total"]["limit_mm"],
@@ -819,17 +828,17 @@ LIMITS += [
         ],
     ),
     (
-        "docs/uncertainty.md",
+        "docs/studies/propagation.md",
         "In tables of more than () rows",
         [simulation_model.MOST_ROWS],
     ),
     (
-        "docs/uncertainty.md",
+        "docs/decision-rules.md",
         "conforms with a probability of () % (k = ()",
         [PERCENT * normal.cdf(1.959964), 1.959964],
     ),
     (
-        "docs/uncertainty.md",
+        "docs/studies/propagation.md",
         "too large by () π s² (() even points)",
         [(24 - 3) / 24, 24],
     ),
@@ -1022,29 +1031,45 @@ def test_a_limit_in_the_text_is_that_of_the_code(page, sentence, values):
 
 
 PRIORS = [
-    ("docs/uncertainty.md", "equal in all courses | () mm, () | | drawn-in", ["common bulge"]),
-    ("docs/uncertainty.md", "equal in all courses | () mm, () | | own bulge", ["drawn-in joints"]),
     (
-        "docs/uncertainty.md",
+        "docs/studies/wall-model.md",
+        "equal in all courses | () mm, () | | drawn-in",
+        ["common bulge"],
+    ),
+    (
+        "docs/studies/wall-model.md",
+        "equal in all courses | () mm, () | | own bulge",
+        ["drawn-in joints"],
+    ),
+    (
+        "docs/studies/wall-model.md",
         "of each course independently | () mm, (); () mm, () |",
         ["own bulge", "own taper"],
     ),
-    ("docs/uncertainty.md", "lapped and telescopic shells do | () mm, () |", ["common taper"]),
     (
-        "docs/uncertainty.md",
+        "docs/studies/wall-model.md",
+        "lapped and telescopic shells do | () mm, () |",
+        ["common taper"],
+    ),
+    (
+        "docs/studies/wall-model.md",
         "variance k^-3; over the whole shell, and of each course | () mm, (); () mm, () |",
         ["common ovality", "own ovality"],
     ),
-    ("docs/uncertainty.md", "to its ends with either sign | () mm, () |", ["turning ovality"]),
-    ("docs/uncertainty.md", "(mean square over the shell) | () mm, () |", ["settlement"]),
     (
-        "docs/uncertainty.md",
+        "docs/studies/wall-model.md",
+        "to its ends with either sign | () mm, () |",
+        ["turning ovality"],
+    ),
+    ("docs/studies/wall-model.md", "(mean square over the shell) | () mm, () |", ["settlement"]),
+    (
+        "docs/studies/wall-model.md",
         "^2)^-2; over the whole shell, and of each course | () mm, (); () mm, () |",
         ["common seams", "own seams"],
     ),
-    ("docs/uncertainty.md", "over half a course in height | () mm, () |", ["dents"]),
+    ("docs/studies/wall-model.md", "over half a course in height | () mm, () |", ["dents"]),
     (
-        "docs/uncertainty.md",
+        "docs/studies/wall-model.md",
         "of all welds together, and of each | peak of () mm, (); () mm, () |",
         ["peaking", "own peaks"],
     ),
@@ -1063,20 +1088,28 @@ def test_priors_of_the_wall_in_the_text(page, sentence, names):
 
 SOLIDS = [
     (
-        "docs/uncertainty.md",
+        "docs/studies/wall-model.md",
         "(rings of plate, girth welds) | bulge | () mm, () each",
         OF_CYLINDERS[0],
     ),
-    ("docs/uncertainty.md", "(a sag) | bulge | () mm, () |", OF_CYLINDERS[2]),
-    ("docs/uncertainty.md", "and over 2 m | ovality | () mm, ();", OF_CYLINDERS[3]),
-    ("docs/uncertainty.md", "ovality | 3 mm, 2.7; () mm, () | | |", OF_CYLINDERS[4]),
-    ("docs/uncertainty.md", "and over 1.5 m | seams | () mm, () each", OF_CYLINDERS[5]),
-    ("docs/uncertainty.md", "dents of 0.3 m | seams | () mm, () |", OF_CYLINDERS[7]),
-    ("docs/uncertainty.md", "along the bottom, over 3 m | seams | () mm, () |", OF_CYLINDERS[8]),
-    ("docs/uncertainty.md", "of the great-circle angle | ovality | () mm, () |", OF_SPHERES[0]),
-    ("docs/uncertainty.md", "dents of 1.2 m | seams | () mm, ();", OF_SPHERES[1]),
-    ("docs/uncertainty.md", "| seams | 4 mm, 2.1; () mm, () | | |", OF_SPHERES[2]),
-    ("docs/uncertainty.md", "by its own weight | oblateness | () mm, () |", OF_SPHERES[3]),
+    ("docs/studies/wall-model.md", "(a sag) | bulge | () mm, () |", OF_CYLINDERS[2]),
+    ("docs/studies/wall-model.md", "and over 2 m | ovality | () mm, ();", OF_CYLINDERS[3]),
+    ("docs/studies/wall-model.md", "ovality | 3 mm, 2.7; () mm, () | | |", OF_CYLINDERS[4]),
+    ("docs/studies/wall-model.md", "and over 1.5 m | seams | () mm, () each", OF_CYLINDERS[5]),
+    ("docs/studies/wall-model.md", "dents of 0.3 m | seams | () mm, () |", OF_CYLINDERS[7]),
+    (
+        "docs/studies/wall-model.md",
+        "along the bottom, over 3 m | seams | () mm, () |",
+        OF_CYLINDERS[8],
+    ),
+    (
+        "docs/studies/wall-model.md",
+        "of the great-circle angle | ovality | () mm, () |",
+        OF_SPHERES[0],
+    ),
+    ("docs/studies/wall-model.md", "dents of 1.2 m | seams | () mm, ();", OF_SPHERES[1]),
+    ("docs/studies/wall-model.md", "| seams | 4 mm, 2.1; () mm, () | | |", OF_SPHERES[2]),
+    ("docs/studies/wall-model.md", "by its own weight | oblateness | () mm, () |", OF_SPHERES[3]),
 ]
 
 
@@ -1088,28 +1121,28 @@ def test_priors_of_horizontal_tanks_and_spheres_in_the_text(page, sentence, depa
 
 RULES = [
     (
-        "docs/uncertainty.md",
+        "docs/decision-rules.md",
         "| `oiml_r71` | U of the volumes: () % vertical, () % horizontal and inclined, () % others",
         "oiml_r71",
     ),
     (
-        "docs/uncertainty.md",
+        "docs/decision-rules.md",
         "| `inmetro_103_2022` | U of the volumes: () % vertical |",
         "inmetro_103_2022",
     ),
     (
-        "docs/uncertainty.md",
+        "docs/decision-rules.md",
         "| `france_2003` | relative U of the volumes: () % vertical, () % others",
         "france_2003",
     ),
-    ("docs/uncertainty.md", "level marks outside: () %;", "france_2003_outside"),
-    ("docs/uncertainty.md", "; alcohol () % |", "france_2003_alcohol"),
+    ("docs/decision-rules.md", "level marks outside: () %;", "france_2003_outside"),
+    ("docs/decision-rules.md", "; alcohol () % |", "france_2003_alcohol"),
     (
-        "docs/uncertainty.md",
+        "docs/decision-rules.md",
         "from the former one: () % at the top and of the whole range",
         "france_2020_recalibration",
     ),
-    ("docs/uncertainty.md", "of at least 500 mm: () % of the capacity", "norway_2007"),
+    ("docs/decision-rules.md", "of at least 500 mm: () % of the capacity", "norway_2007"),
 ]
 
 

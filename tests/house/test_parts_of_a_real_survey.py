@@ -100,7 +100,7 @@ def test_halves_agree_within_their_u(survey, figure):
         figure(f"halves, {name}: part with |E_n| > 1, rms of 2 E_n", f"{beyond:.3f} {scatter:.2f}")
         assert 0.8 < scatter < 1.3
         of_rows, of_deliveries, _ = figures_of(
-            "docs/uncertainty.md",
+            "docs/studies/coverage.md",
             "|E_n| exceeds 1 in () % of rows and in () % of deliveries of () halvings",
         )
         stated = int(of_rows if name == "rows" else of_deliveries) / 100
@@ -121,13 +121,13 @@ def test_rings_at_one_height_are_within_u(survey, whole, zeta, figure):
                f"{ppm[0]:.0f} {ppm[1]:.0f} {np.abs(off[:ROWS]).max():.2f}")  # fmt: skip
         assert np.all(np.abs(off) < 1)
         printed = {
-            "middle": figures_of("docs/uncertainty.md", "| rings at mid height | () | () |"),
+            "middle": figures_of("docs/studies/coverage.md", "| rings at mid height | () | () |"),
             "ends": figures_of(
-                "docs/uncertainty.md",
+                "docs/studies/coverage.md",
                 "| rings at the ends of the courses | () (no row by more than () U) | () |",
             ),
             "three": figures_of(
-                "docs/uncertainty.md", "| three rings | () | () | | without the points"
+                "docs/studies/coverage.md", "| three rings | () | () | | without the points"
             ),
         }[name]
         assert agree(ppm, [printed[0], printed[-1]])
@@ -150,7 +150,7 @@ def test_a_station_less_is_within_u(survey, whole, figure):
         every.append(np.abs(ppm))
     least, most = np.min(every, axis=0), np.max(every, axis=0)
     printed = figures_of(
-        "docs/uncertainty.md",
+        "docs/studies/coverage.md",
         "without the points of one of four stations | () to () | () to () |",
     )
     assert agree([least[0], most[0], least[1], most[1]], printed)
@@ -159,7 +159,7 @@ def test_a_station_less_is_within_u(survey, whole, figure):
 def test_the_bulge_is_the_same_in_all_courses(survey, zeta, figure):
     """The excess at mid course does not fall upwards, as a rest of the widening by filling does."""
     of_page = figures_of(
-        "docs/uncertainty.md",
+        "docs/studies/few-heights.md",
         "the real shell: estimate (its standard uncertainty) | () (()) | () (()) | () (()) | () "
         "(()) |",
     )

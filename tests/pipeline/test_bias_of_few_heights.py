@@ -1,4 +1,4 @@
-"""By how much do a few heights of a course miss its mean area? Evidence for docs/uncertainty.md.
+"""Error of the mean area from a few heights of a course: evidence for docs/studies/few-heights.md.
 
 The sign depends on the kind of shell, so no mean is taken off; these tests fail where the
 documented signs and sizes no longer follow.
@@ -25,27 +25,27 @@ WITHOUT_BULGE = ("brick", "dents", "buckle")
 
 ROWS_OF_PAGE = {
     "settled": (
-        "docs/uncertainty.md",
+        "docs/studies/few-heights.md",
         "(`tests/support/independent_shells.py`) | () (()) | () (()) | () (()) | () (()) |",
     ),
     "flat-plates": (
-        "docs/uncertainty.md",
+        "docs/studies/few-heights.md",
         "flat plates, joints drawn in | () (()) | () (()) | () (()) | () (()) |",
     ),
     "filled": (
-        "docs/uncertainty.md",
+        "docs/studies/few-heights.md",
         "bulge left by filling | () (()) | () (()) | () (()) | () (()) |",
     ),
     "brick": (
-        "docs/uncertainty.md",
+        "docs/studies/few-heights.md",
         "without its added bulge) | () (()) | () (()) | () (()) | () (()) |",
     ),
     "dents": (
-        "docs/uncertainty.md",
+        "docs/studies/few-heights.md",
         "dents, the same | () (()) | () (()) | () (()) | () (()) |",
     ),
     "buckle": (
-        "docs/uncertainty.md",
+        "docs/studies/few-heights.md",
         "buckles at mid course, the same | () (()) | () (()) | () (()) | () (()) |",
     ),
 }
@@ -88,7 +88,7 @@ def test_the_bias_at_few_heights_depends_on_the_kind_of_shell_study(figure):
     (full,) = map(
         int,
         figures_of(
-            "docs/uncertainty.md",
+            "docs/studies/few-heights.md",
             "(In brackets: standard deviation between () shells of a family",
         ),
     )
@@ -140,7 +140,7 @@ def _prior_mean_mm():
 
 def test_the_prior_mean_of_the_bulge_is_stated():
     printed = figures_of(
-        "docs/uncertainty.md",
+        "docs/studies/few-heights.md",
         "A correction by the prior mean of the common bulge would be () mm",
     )
     assert agree([_prior_mean_mm()], printed)

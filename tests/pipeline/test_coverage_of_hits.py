@@ -65,6 +65,6 @@ def test_intervals_hold_on_walls_that_are_not_the_model_study(tmp_path, figure, 
     assert wide < 1.8
     if not straps:
         full, *stated = figures_of(
-            "docs/uncertainty.md", "| wall hits from one set-up | () | (), (), () | () |"
+            "docs/studies/coverage.md", "| wall hits from one set-up | () | (), (), () | () |"
         )
         assert_as_stated(parts, wide, count, stated, int(full))

@@ -117,7 +117,7 @@ ROWS_OF_PAGE = {
         "docs/uncertainty.md",
         "| wall hits, four to six untied set-ups outside | (), (), () | () |",
     ),
-    "tangents": ("docs/uncertainty.md", "| tangents | (), (), () | () | The table is from"),
+    "tangents": ("docs/uncertainty.md", "| tangents | (), (), () | () | | horizontal"),
 }
 
 

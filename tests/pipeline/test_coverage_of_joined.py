@@ -81,10 +81,12 @@ def test_intervals_hold_on_walls_that_are_not_the_model_study(tmp_path, figure, 
     assert min(classes) >= least_in_class(walls, len(classes))
     rows = {
         "untied hits": figures_of(
-            "docs/uncertainty.md", "| wall hits from three untied set-ups | () | (), (), () | () |"
+            "docs/studies/coverage.md",
+            "| wall hits from three untied set-ups | () | (), (), () | () |",
         ),
         "hits, straps and lines": figures_of(
-            "docs/uncertainty.md", "| hits, two straps and lines together | () | (), (), () | () |"
+            "docs/studies/coverage.md",
+            "| hits, two straps and lines together | () | (), (), () | () |",
         ),
     }
     if method in rows:

@@ -49,7 +49,7 @@ def test_intervals_hold_on_walls_that_are_not_the_model(tmp_path, figure):
     parts, wide, classes = study(1, tmp_path, figure, found_of=found_of)
     assert min(parts) > 0.94 - 3 * np.sqrt(0.95 * 0.05 / 15)
     full, *stated = figures_of(
-        "docs/uncertainty.md", "| straps and lines, both faces | () | (), (), () | () |"
+        "docs/studies/coverage.md", "| straps and lines, both faces | () | (), (), () | () |"
     )
     assert_as_stated(parts, wide, len(classes), stated, int(full))
 
@@ -63,7 +63,7 @@ def test_intervals_hold_with_a_declared_collimation_study(tmp_path, figure):
     assert min(classes) >= least_in_class(walls, len(classes))
     assert wide < 1.8
     full, *stated = figures_of(
-        "docs/uncertainty.md",
+        "docs/studies/coverage.md",
         '| the same on one face, collimation of 6" declared | () | (), (), () | () |',
     )
     assert_as_stated(parts, wide, count, stated, int(full))

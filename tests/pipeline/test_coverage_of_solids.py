@@ -104,10 +104,16 @@ def test_intervals_hold_on_solids_that_are_not_the_model_study(kind, tmp_path, f
     assert held[:, -1].mean() > least
     assert held.mean() > least
     assert wide[-1] < MOST_WIDE
-    (full,) = map(int, figures_of("docs/uncertainty.md", "| () of each | total held |"))
+    (full,) = map(
+        int, figures_of("docs/uncertainty.md", "The table is from () shells for each method")
+    )
     *stated, ratio = {
-        "lying": figures_of("docs/uncertainty.md", "| lying | () | () | () |"),
-        "sphere": figures_of("docs/uncertainty.md", "| sphere | () | () | () |"),
+        "lying": figures_of(
+            "docs/uncertainty.md", "| horizontal tank, points (totals, rows) | (), () | () |"
+        ),
+        "sphere": figures_of(
+            "docs/uncertainty.md", "| sphere, points (totals, rows) | (), () | () |"
+        ),
     }[kind]
     assert shares_agree([held[:, -1].mean(), held.mean()], stated, len(held), full)
     assert ratios_agree(wide[-1], ratio, len(held), full)

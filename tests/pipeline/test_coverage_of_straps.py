@@ -61,7 +61,9 @@ def test_intervals_hold_on_walls_that_are_not_the_model_study(tmp_path, figure):
     assert min(parts) > 0.94 - 3 * np.sqrt(0.95 * 0.05 / count)
     assert min(classes) >= least_in_class(walls, len(classes))
     assert wide < 1.6
-    full, *stated = figures_of("docs/uncertainty.md", "| straps alone | () | (), (), () | () |")
+    full, *stated = figures_of(
+        "docs/studies/coverage.md", "| straps alone | () | (), (), () | () |"
+    )
     assert_as_stated(parts, wide, count, stated, int(full))
 
 
@@ -118,7 +120,7 @@ def test_without_the_area_term_intervals_hold_less_study(tmp_path, figure):
     figure("held totals with and without the area term", f"{held[1.0]:.3f} {held[0.0]:.3f}")
     figure("totals off, mean ppm, with and without it", f"{away[1.0]:.0f} {away[0.0]:.0f}")
     (lower,) = figures_of(
-        "docs/uncertainty.md",
+        "docs/studies/coverage.md",
         "Without it (shape declared 0), the share of totals held is lower by more than ()",
     )
     assert held[1.0] > held[0.0] + float(lower)

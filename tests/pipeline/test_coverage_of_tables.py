@@ -181,40 +181,48 @@ def check_lying(folder, scenario, count, figure):
 
 
 ROWS_OF_PAGE = [
-    (NARROW, figures_of("docs/uncertainty.md", "with 30 to 50 degrees of freedom | () to () | |")),
-    (WIDE, figures_of("docs/uncertainty.md", "with 3 and 4 degrees of freedom | () to () | |")),
+    (
+        NARROW,
+        figures_of("docs/studies/coverage.md", "with 30 to 50 degrees of freedom | () to () | |"),
+    ),
+    (
+        WIDE,
+        figures_of("docs/studies/coverage.md", "with 3 and 4 degrees of freedom | () to () | |"),
+    ),
     (
         NOT_SHORT,
         figures_of(
-            "docs/uncertainty.md", "smooth random form of 10 mm at 12 points | () to () | |"
+            "docs/studies/coverage.md", "smooth random form of 10 mm at 12 points | () to () | |"
         ),
     ),
     (
         NARROW + NARROW,
         figures_of(
-            "docs/uncertainty.md",
+            "docs/studies/coverage.md",
             "| lying; 30 to 50 degrees of freedom | () to () | () to () |",
         ),
     ),
     (
         WIDE + NARROW,
         figures_of(
-            "docs/uncertainty.md",
+            "docs/studies/coverage.md",
             "| one input of 2 degrees of freedom, which has most of the variance | () to () | () "
             "to () |",
         ),
     ),
     (
         WIDE + NOT_SHORT,
-        figures_of("docs/uncertainty.md", "| two inputs of 3 | () to () | () to () |"),
+        figures_of("docs/studies/coverage.md", "| two inputs of 3 | () to () | () to () |"),
     ),
     (
         WIDE + NOT_SHORT,
-        figures_of("docs/uncertainty.md", "| four inputs of 2, 3, 4, 5 | () to () | () to () |"),
+        figures_of(
+            "docs/studies/coverage.md", "| four inputs of 2, 3, 4, 5 | () to () | () to () |"
+        ),
     ),
     (
         NARROW,
-        figures_of("docs/uncertainty.md", "or four of 2, 3, 4, 5 | too short | () to () |"),
+        figures_of("docs/studies/coverage.md", "or four of 2, 3, 4, 5 | too short | () to () |"),
     ),
 ]
 
@@ -303,11 +311,11 @@ def check_shells(folder, count, figure):
     assert_within(many.found, NARROW, count)
     assert_within(few.found, WIDE, count)
     most = figures_of(
-        "docs/uncertainty.md",
+        "docs/studies/coverage.md",
         "| the scale as if each course had its own | total below () | |",
     )
     assert of_each.expected[TOTAL] < float(*most)
-    most = figures_of("docs/uncertainty.md", "| **the scale left out** | total below () | |")
+    most = figures_of("docs/studies/coverage.md", "| **the scale left out** | total below () | |")
     assert dropped.expected[TOTAL] < float(*most)
 
 

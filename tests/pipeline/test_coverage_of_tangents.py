@@ -54,5 +54,5 @@ def test_intervals_hold_on_walls_that_are_not_the_model_study(tmp_path, figure):
     count = walls * len(classes)
     assert min(parts) > 0.94 - 3 * np.sqrt(0.95 * 0.05 / count)
     assert min(classes) >= least_in_class(walls, len(classes))
-    full, *stated = figures_of("docs/uncertainty.md", "| tangents | () | (), (), () | () |")
+    full, *stated = figures_of("docs/studies/coverage.md", "| tangents | () | (), (), () | () |")
     assert_as_stated(parts, wide, count, stated, int(full))

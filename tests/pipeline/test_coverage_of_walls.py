@@ -130,16 +130,16 @@ def test_intervals_hold_on_walls_that_are_not_the_model(tmp_path, figure):
 def test_intervals_hold_on_walls_that_are_not_the_model_study(tmp_path, figure):
     walls, each = draws(3, 200), []
     parts, wide, classes = study(walls, tmp_path, figure, each=each)
-    (full,) = map(value_of, figures_of("docs/uncertainty.md", "The table is from () walls"))
+    (full,) = map(value_of, figures_of("docs/studies/coverage.md", "The table is from () walls"))
     stated = {
-        1: figures_of("docs/uncertainty.md", "| one ring a course | () | () | () | () |"),
-        2: figures_of("docs/uncertainty.md", "| two rings | () | () | () | () |"),
-        3: figures_of("docs/uncertainty.md", "| three rings | () | () | () | () |"),
+        1: figures_of("docs/studies/coverage.md", "| one ring a course | () | () | () | () |"),
+        2: figures_of("docs/studies/coverage.md", "| two rings | () | () | () | () |"),
+        3: figures_of("docs/studies/coverage.md", "| three rings | () | () | () | () |"),
     }
     for rings, row in stated.items():
         mine = [one for one in each if one.rings == rings]
         assert_as_stated(*shares_of(mine), len(mine), row, full / 3)
-    row = figures_of("docs/uncertainty.md", "| all | () | () | () | () |")
+    row = figures_of("docs/studies/coverage.md", "| all | () | () | () | () |")
     assert_as_stated(parts, wide, len(each), row, full)
     count = walls * len(classes)
     assert min(parts) > LEAST_HELD - 3 * np.sqrt(0.95 * 0.05 / count)

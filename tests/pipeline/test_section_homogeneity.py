@@ -205,7 +205,7 @@ def test_form_of_valid_walls_is_no_noise_study(tmp_path, figure):
     share = share_accused(count, tmp_path)
     figure(f"valid surveys whose sections are called unequal, of {count}", f"{share:.4f}")
     (percent,) = figures_of(
-        "docs/uncertainty.md",
+        "docs/studies/section-noise.md",
         "(six families outside the model), at most () % are reported as unequal",
     )
     assert int(percent) == 100 * SHARE_ACCUSED
@@ -223,7 +223,7 @@ def test_a_course_of_other_noise_is_found(factor, tmp_path, figure):
     found = [bool(codes_of(drawn_job(s, tmp_path, factor, (0.008, 0.014)))) for s in range(12)]
     figure(f"courses of {factor} times the noise that are found, of 12", f"{np.mean(found):.2f}")
     stated = figures_of(
-        "docs/uncertainty.md",
+        "docs/studies/section-noise.md",
         "Three times the noise in one course is detected in () of () surveys, a fifth of the noise "
         "in () of ()",
     )

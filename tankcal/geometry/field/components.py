@@ -173,7 +173,7 @@ _FREE = (0, 0, *(order**-2.0 for order in range(2, 7)))
 _LINEAR = (0, 1)
 # Median rms in metres and standard deviation of ln(variance). Pages print exp(log_sd / 2), the
 # factor of the rms. The sizes were varied until walls of one draw held and the rings of the real
-# shell agreed with all of its points: docs/uncertainty.md, "How the amplitudes were chosen". The
+# shell agreed with all of its points: docs/studies/wall-model.md. The
 # other draws of tests/pipeline/test_coverage_of_walls.py judge them.
 COMPONENTS = (
     Component("common bulge", "bulge", "mean", True, "plate", 1.05e-3, 1.0, "barrel"),

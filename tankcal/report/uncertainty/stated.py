@@ -1,7 +1,7 @@
 """Stated uncertainty of the rows of the table, of single volumes, and of deliveries.
 
 If Monte Carlo does not validate the GUM interval, the Monte Carlo interval is stated. U is then the
-larger distance of its ends from the volume (docs/uncertainty.md).
+larger distance of its ends from the volume (docs/studies/propagation.md).
 """
 
 from tankcal.report.tables import Column, Table
