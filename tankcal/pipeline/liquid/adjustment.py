@@ -257,7 +257,7 @@ def adjusted_at(geometry, fill, run_effect, corrections_m=None):
     if run_result.sd > 0:
         effects.append(Effect(RUNS, readings.run_m3 * run_result.sd))
     adjusted = adjust_steps(misclosure, readings.noise, effects)
-    columns = [effect.columns for effect in (*readings.noise, *effects) if not effect.is_free]
+    known = [effect.columns for effect in (*readings.noise, *effects) if not effect.is_free]
     return LiquidFound(
         known=_results_for_body(
             geometry, (loaded, sources, moved_inputs), adjusted, (metering, fill, run_result)
@@ -269,24 +269,25 @@ def adjusted_at(geometry, fill, run_effect, corrections_m=None):
         adjusted=adjusted,
         run_effect=run_result,
         before=reduced,
-        before_sd_m3=np.linalg.norm(np.hstack(columns), axis=1),
-        misfit=_misfit(adjusted, held, sources, moved_inputs),
+        before_sd_m3=np.sqrt(sum((columns**2).sum(axis=1) for columns in known)),
+        misfit=_misfit(adjusted, held, moved_inputs),
         corrections_m=corrections_m,
     )
 
 
-def _misfit(adjusted, misclosure, sources, moved):
+def _misfit(adjusted, misclosure, moved):
     """Chi-square of misclosures (n,) with the moved inputs held, plus their own chi-square."""
     if not moved:
         return adjusted.chi2
-    held_columns = np.stack([column_of(sources, place) for place, _ in moved], axis=1)
-    columns = [effect.columns for effect in (*adjusted.noise, *adjusted.effects)]
-    all_columns = np.hstack(columns)
-    # Inputs held at their values add no covariance to the misclosures; their deviates count.
-    covariance = all_columns @ all_columns.T - held_columns @ held_columns.T
+    geometry, *others = adjusted.effects
+    # Inputs held at their values add no covariance to the misclosures; their deviates count. The
+    # covariance without them is that of the columns times a root of I - P, P of the held inputs.
+    rows = np.stack([place.row for place, _ in moved])
+    shares, axes = np.linalg.eigh(np.eye(rows.shape[1]) - rows.T @ rows)
+    kept = geometry.columns @ (axes * np.sqrt(np.maximum(shares, 0.0)))
     deviates = np.array([deviate for _, deviate in moved])
-    fit = misclosure @ np.linalg.solve(covariance, misclosure)
-    return float(fit + deviates @ deviates)
+    fit = adjust_steps(misclosure, adjusted.noise, [replace(geometry, columns=kept), *others])
+    return float(fit.chi2 + deviates @ deviates)
 
 
 def _bottom_effects(geometry, metering, fill, loaded, by_step):
@@ -296,7 +297,7 @@ def _bottom_effects(geometry, metering, fill, loaded, by_step):
         head = by_step @ np.maximum(loaded.level_m, 0.0)
         effects.append(Effect(FLEX, metering.flex_sd_m3_per_m * head[:, None]))
     if bottom_is_free(geometry.job, fill):
-        effects.append(Effect(BOTTOM, by_step.sum(axis=1, keepdims=True), is_free=True))
+        effects.append(Effect(BOTTOM, by_step.sum(axis=1)[:, None], is_free=True))
     return effects
 
 
@@ -375,7 +376,10 @@ def _reduce_columns(adjusted, columns):
     names = [effect.kind for effect in adjusted.effects]
     places = [adjusted.place(kind) for kind in ("geometry", BOTTOM, FLEX) if kind in names]
     by_readings = np.vstack([adjusted.gain[place] for place in places]) @ columns
-    _, singular_values, rotation = np.linalg.svd(by_readings, full_matrices=False)
+    # The singular vectors of the few rows of R' are those of by_readings = R' Q', turned by Q.
+    basis, triangle = np.linalg.qr(by_readings.T)
+    _, singular_values, turn = np.linalg.svd(triangle.T, full_matrices=False)
+    rotation = turn @ basis.T
     return columns @ rotation[singular_values > LOST * np.max(singular_values, initial=0.0)].T
 
 

@@ -424,7 +424,7 @@ def alternatives_of(adjustment):
     metering, loaded = geometry.job.liquid, adjustment.loaded
     over = fill.differences(reduced.carried)
     rows = metering.row[fill.dip_row]
-    area = over * loaded.area_m2
+    area = over.toarray() * loaded.area_m2
     causes = [
         Alternative("meter", column, name, most=MOST_FACTOR)
         for name, column in zip(fill.meters, _meter_columns(metering, fill, reduced), strict=True)
@@ -449,7 +449,7 @@ def alternatives_of(adjustment):
 def _meter_columns(metering, fill, reduced):
     """Effect (n,) of each meter factor on the misclosures."""
     meters = np.array(metering.meter)
-    return [-reduced.by_row_m3[:, meters == name].sum(axis=1) for name in fill.meters]
+    return [-fill.sum_rows(reduced.by_row_m3, meters == name) for name in fill.meters]
 
 
 def _leak_causes(metering, fill):

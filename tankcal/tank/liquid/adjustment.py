@@ -12,8 +12,8 @@ least squares of
     [W A  W F] [z]   [W y]
     [ I    0 ] [b] = [ 0 ]
 
-gives z and b = G y. The orthogonal complement gives the weights M of all tests: for any cause with
-the column c (m3 per unit of the cause)
+gives z and b = G y. The rows Q of its orthonormal basis that belong to the steps give the weights
+M = W' (I - Q Q') W of all tests: for any cause with the column c (m3 per unit of the cause)
 
     size = c' M y / c' M c,   sd = 1 / sqrt(c' M c),   w = size / sd.
 
@@ -49,6 +49,7 @@ from functools import cached_property
 
 import numpy as np
 import scipy.linalg
+import scipy.sparse
 
 from tankcal.adjust import noncentrality
 from tankcal.errors import SolutionError
@@ -69,9 +70,9 @@ class Effect:
     Attributes
     ----------
     kind : str
-    columns : ndarray, shape (n, c)
+    columns : ndarray or scipy.sparse.csr_array, shape (n, c)
         Change of the misclosures for one standard deviation of each cause, m3; for a free cause:
-        for one unit.
+        for one unit. Columns of single readings are sparse.
     is_free : bool
         True: no prior.
     """
@@ -79,6 +80,53 @@ class Effect:
     kind: str
     columns: np.ndarray
     is_free: bool = False
+
+
+class StepWeights:
+    """Weights M = W' (I - Q Q') W of n steps, as an operator: M c is computed without M.
+
+    Parameters
+    ----------
+    lower : ndarray, shape (width + 1, n)
+        Cholesky factor of the covariance of the readings, banded.
+    rotation : ndarray, shape (n + priors, c)
+        Orthonormal basis of the whitened design, with the rows of the priors below those of the
+        steps.
+    """
+
+    __array_ufunc__ = None  # numpy leaves `array @ weights` to __rmatmul__
+
+    def __init__(self, lower, rotation):
+        self._lower, self._rotation = lower, rotation
+
+    def __matmul__(self, columns):
+        """M c, shape (n,) or (n, k)."""
+        projected = self._project(columns)[: self._lower.shape[1]]
+        return _whiten(self._lower, projected, is_transposed=True)
+
+    def __rmatmul__(self, rows):
+        """Products c' M, shape (n,) or (k, n)."""
+        return (self @ rows.T).T
+
+    def quadratic_forms(self, columns):
+        """Return c' M c and c' R^-1 c of columns (n, k), each (k,)."""
+        columns = _make_dense(columns)
+        largest = np.sum(_whiten(self._lower, columns) ** 2, axis=0)
+        # The projection is orthogonal with the rows of the priors, so that its squared length is
+        # the form itself. The difference of two large forms would lose digits.
+        return np.sum(self._project(columns) ** 2, axis=0), largest
+
+    def _project(self, columns):
+        """Part of (W c, 0) orthogonal to the design, with the rows of the priors."""
+        white = _whiten(self._lower, _make_dense(columns))
+        projected = -self._rotation @ (self._rotation[: len(white)].T @ white)
+        projected[: len(white)] += white
+        return projected
+
+
+def _make_dense(columns):
+    """Return columns as an array."""
+    return columns.toarray() if scipy.sparse.issparse(columns) else np.asarray(columns)
 
 
 @dataclass(frozen=True)
@@ -97,7 +145,7 @@ class LiquidAdjustment:
     sd : ndarray, shape (c,)
         Standard deviations of the estimates, in standard deviations of the effects (for a free
         effect: in its unit).
-    weight : ndarray, shape (n, n)
+    weight : StepWeights
         M, 1/m6.
     """
 
@@ -106,7 +154,7 @@ class LiquidAdjustment:
     effects: tuple[Effect, ...]
     gain: np.ndarray
     sd: np.ndarray
-    weight: np.ndarray
+    weight: StepWeights
 
     @cached_property
     def estimate(self):
@@ -146,9 +194,8 @@ class LiquidAdjustment:
         0.
         """
         columns = np.asarray(columns, dtype=float)
-        information = np.einsum("nk,nm,mk->k", columns, self.weight, columns)
-        largest = np.sum(columns**2, axis=0) * np.max(np.diag(self.weight), initial=0.0)
-        # c' M c relative to its largest possible value: below, the remainder is rounding.
+        information, largest = self.weight.quadratic_forms(columns)
+        # c' M c relative to its largest possible value c' R^-1 c: below, the remainder is rounding.
         is_determined = information > UNTESTABLE * largest
         divisor = np.where(is_determined, information, 1.0)
         size = np.where(is_determined, columns.T @ self.pulled / divisor, 0.0)
@@ -163,8 +210,7 @@ class LiquidAdjustment:
         residual, and w is the test statistic.
         """
         deviates = effect.columns.T @ self.pulled
-        columns = effect.columns
-        redundancy = np.einsum("nk,nm,mk->k", columns, self.weight, columns)
+        redundancy, _ = self.weight.quadratic_forms(effect.columns)
         divisor = np.sqrt(np.maximum(redundancy, 1e-30))
         return deviates, redundancy, np.where(redundancy > UNTESTABLE, deviates / divisor, 0.0)
 
@@ -203,28 +249,23 @@ def adjust_steps(misclosure_m3, noise, effects):
     effects = tuple(sorted(effects, key=lambda effect: effect.is_free))
     priors = _stack_columns([effect for effect in effects if not effect.is_free], len(y))
     free = _stack_columns([effect for effect in effects if effect.is_free], len(y))
-    reading_columns = _stack_columns(noise, len(y))
-    whiten = _whitening_matrix(reading_columns)
+    lower = _factor_noise(noise, len(y))
     prior_count = priors.shape[1]
     design = np.zeros((len(y) + prior_count, prior_count + free.shape[1]))
-    design[: len(y)] = whiten @ np.hstack([priors, free])
+    design[: len(y)] = _whiten(lower, np.hstack([priors, free]))
     design[len(y) :, :prior_count] = np.eye(prior_count)
-    # Full QR decomposition: the first columns give the estimates, the others the weights of tests.
-    rotation, upper, order = scipy.linalg.qr(design, pivoting=True)
+    rotation, upper, order = scipy.linalg.qr(design, mode="economic", pivoting=True)
     count = design.shape[1]
-    upper = upper[:count]
     _refuse_unobserved(upper, free.shape[1])
     inverse = np.empty_like(upper)
     inverse[order] = scipy.linalg.solve_triangular(upper, np.eye(count))
-    # M = W' Q2 Q2' W, with Q2 the complement of the design in the rows of the misclosures.
-    complement = whiten.T @ rotation[: len(y), count:]
     return LiquidAdjustment(
         misclosure_m3=y,
         noise=tuple(noise),
         effects=effects,
-        gain=inverse @ rotation[: len(y), :count].T @ whiten,
+        gain=_whiten(lower, rotation[: len(y)] @ inverse.T, is_transposed=True).T,
         sd=np.linalg.norm(inverse, axis=1),
-        weight=complement @ complement.T,
+        weight=StepWeights(lower, rotation),
     )
 
 
@@ -233,13 +274,24 @@ def _stack_columns(effects, rows):
     return np.hstack([np.zeros((rows, 0)), *(effect.columns for effect in effects)])
 
 
-def _whitening_matrix(columns):
-    """Return W (n, n) with W (N N') W' = I."""
+def _factor_noise(noise, rows):
+    """Return the lower Cholesky factor of R = N N' in banded form, shape (width + 1, rows).
+
+    A reading belongs to neighbouring steps, so R has few diagonals.
+    """
+    columns = scipy.sparse.hstack(
+        [scipy.sparse.csr_array((rows, 0)), *(effect.columns for effect in noise)], format="csr"
+    )
+    covariance = (columns @ columns.T).tocoo()
+    below = covariance.row >= covariance.col
+    row, column, value = (part[below] for part in (covariance.row, covariance.col, covariance.data))
+    bands = np.zeros((np.max(row - column, initial=0) + 1, rows))
+    bands[row - column, column] = value
     try:
-        lower = np.linalg.cholesky(columns @ columns.T)
+        lower = scipy.linalg.cholesky_banded(bands, lower=True)
     except np.linalg.LinAlgError:
         lower = None
-    if lower is None or np.min(np.diag(lower)) < 1e-9 * np.max(np.diag(lower), initial=0.0):
+    if lower is None or np.min(lower[0]) < 1e-9 * np.max(lower[0], initial=0.0):
         raise SolutionError(
             message(
                 "steps_without_error",
@@ -248,7 +300,18 @@ def _whitening_matrix(columns):
                 "above 0",
             )
         )
-    return scipy.linalg.solve_triangular(lower, np.eye(len(lower)), lower=True)
+    return lower
+
+
+def _whiten(lower, columns, *, is_transposed=False):
+    """Return W c of columns (n, c), or W' c, with W the inverse of the banded factor."""
+    width = len(lower) - 1
+    if not is_transposed:
+        return scipy.linalg.solve_banded((width, 0), lower, columns)
+    upper = np.zeros_like(lower)  # row i of the transposed bands is moved right by its distance
+    for distance, band in enumerate(lower):
+        upper[width - distance, distance:] = band[: band.size - distance]
+    return scipy.linalg.solve_banded((0, width), upper, columns)
 
 
 def _refuse_unobserved(upper, free):
@@ -398,7 +461,7 @@ def estimate_run_effect(weight, misclosure_m3, run_m3):
 
     Parameters
     ----------
-    weight : ndarray, shape (n, n)
+    weight : StepWeights
         M without a run effect.
     misclosure_m3 : ndarray, shape (n,)
     run_m3 : ndarray, shape (n, runs)

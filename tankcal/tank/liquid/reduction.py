@@ -23,10 +23,13 @@ misclosure (metered less geometry) is smaller.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import csr_array, diags_array
 
 from tankcal.tank.liquid.adjustment import Effect
 
-MOST_ROWS = 3000  # largest number of rows of liquid.csv; the adjustment uses dense matrices
+MOST_ROWS = (
+    3000  # largest number of rows of liquid.csv; the tests of all dips and batches are dense
+)
 EMPTY = -1  # start of a step in the empty, dry tank, in place of the index of a dip
 EXPANSION_STEP = 1e-3  # relative step of the expansion, in which misclosures are nearly linear
 
@@ -46,8 +49,9 @@ class Fill:
         tank.
     run : ndarray of int, shape (n,)
         Index of the run of each step in `runs`.
-    batches : ndarray of bool, shape (n, rows)
-        Rows whose volumes belong to each step: several rows if the dips between them are not valid.
+    step : ndarray of int, shape (rows,)
+        Step to which the volume of each row belongs, -1: none. A step has several rows if the dips
+        between them are not valid.
     """
 
     runs: tuple[str, ...]
@@ -56,7 +60,7 @@ class Fill:
     start: np.ndarray
     end: np.ndarray
     run: np.ndarray
-    batches: np.ndarray
+    step: np.ndarray
 
     def __len__(self):
         """Number of steps."""
@@ -67,14 +71,18 @@ class Fill:
         """Steps (n,) that start in the empty tank."""
         return self.start == EMPTY
 
+    def sum_rows(self, values, rows=True):
+        """Sum (n,) of values (rows,) by step; rows (rows,): those that count."""
+        rows = (self.step >= 0) & rows
+        return np.bincount(self.step[rows], values[rows], minlength=len(self))
+
     def differences(self, carried=None):
-        """Return the matrix T (n, d) of V(h_k) - q_k V(h_k-1); carried (n,) is q, None: 1."""
-        matrix, rows = np.zeros((len(self), len(self.dip_row))), np.arange(len(self))
-        matrix[rows, self.end] = 1.0
-        filled = ~self.from_empty
+        """Return the sparse T (n, d) of V(h_k) - q_k V(h_k-1); carried (n,) is q, None: 1."""
+        rows, filled = np.arange(len(self)), ~self.from_empty
         q = np.ones(len(self)) if carried is None else carried
-        matrix[rows[filled], self.start[filled]] = -q[filled]
-        return matrix
+        values = np.append(np.ones(len(self)), -q[filled])
+        places = np.append(rows, rows[filled]), np.append(self.end, self.start[filled])
+        return csr_array((values, places), shape=(len(self), len(self.dip_row)))
 
 
 def fill_of(metering):
@@ -109,12 +117,12 @@ def fill_of(metering):
                     steps.append((start_dip, len(dips), number, rows))
                 start_dip, rows = len(dips), []
                 dips.append(place)
-    batches = np.zeros((len(steps), len(metering.run)), dtype=bool)
-    for line, (_, _, _, rows) in zip(batches, steps, strict=True):
-        line[rows] = True
+    step = np.full(len(metering.run), -1)
+    for number, (_, _, _, rows) in enumerate(steps):
+        step[rows] = number
     start, end, run = np.array([step[:3] for step in steps], dtype=int).reshape(-1, 3).T
     meters = tuple(dict.fromkeys(metering.meter))
-    return Fill(runs, meters, np.array(dips, dtype=int), start, end, run, batches)
+    return Fill(runs, meters, np.array(dips, dtype=int), start, end, run, step)
 
 
 @dataclass(frozen=True)
@@ -138,8 +146,8 @@ class ReducedSteps:
         f v m / c: part of the increment that is proportional to the meter factor.
     carried : ndarray
         q, factor on the volume before the step.
-    by_row_m3 : ndarray, shape (n, rows)
-        `metered_m3` for each row of the metering.
+    by_row_m3 : ndarray, shape (rows,)
+        `metered_m3` for each row of the metering; 0 for rows without a step.
     """
 
     indicated_m3: np.ndarray
@@ -175,9 +183,10 @@ def reduce_steps(metering, fill, volume_m3, growth=None):
     volume = np.asarray(volume_m3, dtype=float)
     shell_factors = np.ones(len(volume)) if growth is None else np.asarray(growth, dtype=float)
     factor = np.array([metering.meters[name].factor for name in metering.meter])
-    indicated = np.where(fill.batches, metering.volume_m3, 0.0)
+    indicated = np.where(fill.step >= 0, metering.volume_m3, 0.0)
     tank = metering.tank_c[fill.dip_row]
-    meter_to_tank = density_ratio(metering, metering.meter_c, tank[fill.end][:, None])
+    end_of_row = fill.end[fill.step]  # of rows without a step: any, as their volume is 0
+    meter_to_tank = density_ratio(metering, metering.meter_c, tank[end_of_row])
     # Apply the corrections in turn, so that their sum is exactly the increment.
     at_meter = factor * indicated
     in_tank = at_meter * meter_to_tank
@@ -187,19 +196,20 @@ def reduce_steps(metering, fill, volume_m3, growth=None):
     carried = density_ratio(metering, tank[fill.start], tank[fill.end])
     carried = np.where(fill.from_empty, 1.0, carried * shell_factors[fill.start] / shell)
     by_tank = (carried - 1) * previous
-    by_row = in_tank / shell[:, None]
+    by_row = in_tank / shell_factors[end_of_row]
     geometry = volume[fill.end] - previous
-    increment = by_row.sum(axis=1) + by_tank
+    metered = fill.sum_rows(by_row)
+    increment = metered + by_tank
     return ReducedSteps(
-        indicated_m3=indicated.sum(axis=1),
-        by_factor_m3=(at_meter - indicated).sum(axis=1),
-        by_meter_temperature_m3=(in_tank - at_meter).sum(axis=1),
-        by_shell_m3=(by_row - in_tank).sum(axis=1),
+        indicated_m3=fill.sum_rows(indicated),
+        by_factor_m3=fill.sum_rows(at_meter - indicated),
+        by_meter_temperature_m3=fill.sum_rows(in_tank - at_meter),
+        by_shell_m3=fill.sum_rows(by_row - in_tank),
         by_tank_temperature_m3=by_tank,
         increment_m3=increment,
         geometry_m3=geometry,
         misclosure_m3=increment - geometry,
-        metered_m3=by_row.sum(axis=1),
+        metered_m3=metered,
         carried=carried,
         by_row_m3=by_row,
     )
@@ -278,23 +288,21 @@ def reading_effects(metering, fill, reduced, volume_m3, area_m2, growth=None):
     ReadingEffects
         Without effects of size zero.
     """
-    dips = fill.differences(reduced.carried) * np.asarray(area_m2)
+    dips = fill.differences(reduced.carried) @ diags_array(np.asarray(area_m2))
+    by_degree = _temperature_columns(metering, fill, reduced, volume_m3)
     noise = [
-        Effect("meter_repeatability", np.diag(-batch_sd_m3(metering, fill))),
-        Effect("dip_readings", dips * metering.s_dip_m[fill.dip_row]),
-        Effect(
-            "liquid_temperatures",
-            metering.u_temperature_c * _temperature_columns(metering, fill, reduced, volume_m3),
-        ),
+        Effect("meter_repeatability", diags_array(-batch_sd_m3(metering, fill)).tocsr()),
+        Effect("dip_readings", dips @ diags_array(metering.s_dip_m[fill.dip_row])),
+        Effect("liquid_temperatures", metering.u_temperature_c * by_degree),
     ]
     meter_names = np.array(metering.meter)
     columns = [
-        reduced.by_row_m3[:, meter_names == name].sum(axis=1) * metering.meters[name].u_factor
+        fill.sum_rows(reduced.by_row_m3, meter_names == name) * metering.meters[name].u_factor
         for name in fill.meters
     ]
     common = [
         Effect("meter_factor", -np.stack(columns, axis=1)),
-        Effect("dip_zero", metering.u_dip_zero_m * dips.sum(axis=1, keepdims=True)),
+        Effect("dip_zero", metering.u_dip_zero_m * dips.sum(axis=1)[:, None]),
         Effect("liquid_expansion", _expansion_columns(metering, fill, volume_m3, growth)),
     ]
     run_m3 = -reduced.metered_m3[:, None] * (fill.run[:, None] == np.arange(len(fill.runs)))
@@ -312,25 +320,28 @@ def batch_sd_m3(metering, fill):
     fixed = np.array([flow_meter.fixed_m3 for flow_meter in meters])
     by_meter = np.hypot(relative * metering.volume_m3, fixed)
     row_sd = np.where(np.isfinite(metering.s_volume_m3), metering.s_volume_m3, by_meter)
-    counted = fill.batches & (metering.volume_m3 != 0)
-    return np.sqrt(np.sum(np.where(counted, row_sd, 0.0) ** 2, axis=1))
+    return np.sqrt(fill.sum_rows(row_sd**2, metering.volume_m3 != 0))
 
 
 def _temperature_columns(metering, fill, reduced, volume_m3):
     """Return the change (n, temperatures) of the misclosures per degree of each reading."""
     b, volume, end, start = metering.expansion_per_k, volume_m3, fill.end, fill.start
-    tank = metering.tank_c[fill.dip_row]
-    is_known = np.isfinite(metering.meter_c) & np.isfinite(tank[end])[:, None]
-    by_rows = b * np.where(is_known, reduced.by_row_m3, 0.0)
+    tank, steps = metering.tank_c[fill.dip_row], len(fill)
+    has_step = np.flatnonzero(fill.step >= 0)
+    step = fill.step[has_step]
+    is_known = np.isfinite(metering.meter_c[has_step]) & np.isfinite(tank[end[step]])
+    by_row = b * np.where(is_known, reduced.by_row_m3[has_step], 0.0)
     previous = np.where(fill.from_empty, 0.0, reduced.carried * volume[start])
     both_known = np.isfinite(tank[end]) & np.isfinite(tank[start]) & ~fill.from_empty
     previous = b * np.where(both_known, previous, 0.0)
-    by_dips = np.zeros((len(fill), len(volume)))
-    lines = np.arange(len(fill))
     # A warmer tank at the end of a step: less volume arrived, and the previous content expanded.
-    by_dips[lines, end] -= by_rows.sum(axis=1) + previous
-    by_dips[lines[both_known], start[both_known]] += previous[both_known]
-    return np.hstack([by_rows[:, np.any(fill.batches, axis=0)], by_dips])
+    at_end = -(np.bincount(step, by_row, minlength=steps) + previous)
+    lines, columns = np.arange(steps), len(has_step)
+    values = [by_row, at_end, previous[both_known]]
+    rows = [step, lines, lines[both_known]]
+    places = [np.arange(columns), columns + end, columns + start[both_known]]
+    where = np.concatenate(rows), np.concatenate(places)
+    return csr_array((np.concatenate(values), where), shape=(steps, columns + len(volume)))
 
 
 def _expansion_columns(metering, fill, volume_m3, growth):
@@ -350,7 +361,7 @@ def _expansion_columns(metering, fill, volume_m3, growth):
 
 def _nonzero_effects(effects):
     """Return the effects that have any non-zero column."""
-    return [effect for effect in effects if np.any(effect.columns)]
+    return [effect for effect in effects if abs(effect.columns).max() > 0]
 
 
 def as_fahrenheit(metering):
