@@ -88,6 +88,17 @@ def test_names_of_code_are_there(page):
     assert [path for path in FILE.findall(text) if not any(ROOT.glob(path.rstrip("/")))] == []
 
 
+def test_limitations_are_short_and_linked():
+    """At most 60 bullets of at most 25 words, each linked to its page, with a remedy after it."""
+    text = (ROOT / "docs/limits.md").read_text(encoding="utf-8")
+    bullets = re.findall(r"^- (.+)$", text, flags=re.M)
+    assert 40 < len(bullets) <= 60
+    for bullet in bullets:
+        assert re.match(r"\[.+?\]\([^)]+\): .+\. .+\.$", bullet), bullet
+        words = LINK.sub("", bullet).split()
+        assert len(words) <= 25, bullet
+
+
 def test_readme_is_short():
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 90
 

@@ -946,16 +946,11 @@ LIMITS += [
         "farther from the wall than () % of the radius, and farther than () mm",
         [PERCENT * shell.WALL_BAND, MM * shell.LEAST_BAND_M],
     ),
-    (
-        "docs/limits.md",
-        "This requires a distance below () % of the radius (at least () mm)",
-        [PERCENT * shell.WALL_BAND, MM * shell.LEAST_BAND_M],
-    ),
     ("docs/limits.md", "or a pipe within () mm of the wall", [MM * patches.FARTHEST_M]),
-    ("docs/limits.md", "or less than () mm from the wall", [MM * blunders.LEAST_M]),
+    ("docs/limits.md", "or pipes less than () mm from the wall", [MM * blunders.LEAST_M]),
     (
         "docs/limits.md",
-        "Clutter within () % of the radius and () mm of the wall",
+        "clutter within () % of the radius and () mm of the wall",
         [PERCENT * scanned_solids.NEVER_PART, MM * scanned_solids.NEVER_M],
     ),
     (
