@@ -89,6 +89,8 @@ def main(target, executed):
             text = from_root(with_contents(text, notebooks))
             put(target / "index.md", with_links(text, ROOT, staged))
             continue
+        if path == ROOT / "docs/studies/index.md":
+            text += "\n" + contents("Studies", [goal for _, _, goal in LINK.findall(text)])
         if path == ROOT / "docs/benchmarks.md" and RESULTS.exists():
             text = with_results(text)
         put(target / path.relative_to(ROOT), with_links(text, path.parent, staged))
@@ -147,7 +149,7 @@ def with_links(text, folder, staged):
 
 
 def with_contents(text, notebooks):
-    """The first page with the contents of the site: the pages that it lists, gallery, reference."""
+    """The first page with the contents of the site: pages by kind, gallery, API, examples."""
     parts = []
     for heading, body in re.findall(r"^## (.+)\n((?:(?!^## ).*\n?)*)", text, flags=re.M):
         names = [goal for _, _, goal in LINK.findall(body) if goal.endswith(".md")]
