@@ -110,7 +110,8 @@ class StepWeights:
 
     def quadratic_forms(self, columns):
         """Return c' M c and c' R^-1 c of columns (n, k), each (k,)."""
-        columns = _make_dense(columns)
+        if scipy.sparse.issparse(columns):
+            columns = columns.toarray()
         largest = np.sum(_whiten(self._lower, columns) ** 2, axis=0)
         # The projection is orthogonal with the rows of the priors, so that its squared length is
         # the form itself. The difference of two large forms would lose digits.
@@ -118,15 +119,10 @@ class StepWeights:
 
     def _project(self, columns):
         """Part of (W c, 0) orthogonal to the design, with the rows of the priors."""
-        white = _whiten(self._lower, _make_dense(columns))
+        white = _whiten(self._lower, columns)
         projected = -self._rotation @ (self._rotation[: len(white)].T @ white)
         projected[: len(white)] += white
         return projected
-
-
-def _make_dense(columns):
-    """Return columns as an array."""
-    return columns.toarray() if scipy.sparse.issparse(columns) else np.asarray(columns)
 
 
 @dataclass(frozen=True)
