@@ -64,8 +64,8 @@ bench: export ROUNDS ?= 5
 bench: $(PEERS)/errors.json ## time and memory of what people wait for, beside Ceres, gtsam, GTC, open3d, fluids: build/benchmarks.json
 	$(PEERS)/bin/python benchmarks/run.py $(ONLY)
 
-benchmark-page: ## fill the tables of docs/benchmarks.md with the last make bench
-	$(BIN)/python benchmarks/page.py build/benchmarks.json docs/benchmarks.md
+benchmark-page: ## fill the tables of docs/studies/benchmarks.md with the last make bench
+	$(BIN)/python benchmarks/page.py build/benchmarks.json docs/studies/benchmarks.md
 
 picture: notebooks ## the pictures in the README, of the example's report and the notebooks (needs poppler)
 	$(BIN)/tankcal demo --quiet --out demo-results

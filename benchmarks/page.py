@@ -1,6 +1,6 @@
-"""Fills the tables of docs/benchmarks.md from the results of a run.
+"""Fills the tables of docs/studies/benchmarks.md from the results of a run.
 
-    python benchmarks/page.py build/benchmarks.json docs/benchmarks.md
+    python benchmarks/page.py build/benchmarks.json docs/studies/benchmarks.md
 
 What stands between the marks is replaced, the prose around it is kept.
 """

@@ -91,7 +91,7 @@ def main(target, executed):
             continue
         if path == ROOT / "docs/studies/index.md":
             text += "\n" + contents("Studies", [goal for _, _, goal in LINK.findall(text)])
-        if path == ROOT / "docs/benchmarks.md" and RESULTS.exists():
+        if path == ROOT / "docs/studies/benchmarks.md" and RESULTS.exists():
             text = with_results(text)
         put(target / path.relative_to(ROOT), with_links(text, path.parent, staged))
     shutil.copytree(ROOT / "docs/images", target / "docs/images")

@@ -167,7 +167,7 @@ def test_volume_under_the_first_course(name, figure):  # simulation: rays
     share = 100 * abs(volume - truth) / tank
     figure(f"bottom of a cloud, {name}: volume off", f"{share:.4f} % of the tank")
     (percent,) = figures_of(
-        "docs/clouds-wall.md",
+        "docs/studies/clouds-wall.md",
         "the error of the volume under the first course and its U are each less than () % of the "
         "volume of the tank",
     )

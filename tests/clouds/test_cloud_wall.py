@@ -255,7 +255,7 @@ def test_clutter_moves_no_radius(name, figure):  # simulation: rays, not the mod
     figure(name + "wall kept", f"{100 * kept:.2f} %")
     figure(name + "masked", f"{100 * wall.masked_share.mean():.0f} %")
     most_mm, least_kept = figures_of(
-        "docs/clouds-wall.md",
+        "docs/studies/clouds-wall.md",
         "In every scene the bias of each course is less than () mm, and at least () % of the cells "
         "of the wall are kept",
     )
@@ -391,7 +391,7 @@ def test_clutter_of_a_lying_cylinder_moves_no_radius(side, figure):  # simulatio
     off = np.concatenate(off)
     figure(f"cells of a lying cloud, {side}: bias", f"{1e3 * off.mean():.3f} mm")
     figure(f"cells of a lying cloud, {side}: masked", f"{100 * wall.masked_share[0]:.0f} %")
-    (most_mm,) = figures_of("docs/clouds-wall.md", "the bias is also less than () mm")
+    (most_mm,) = figures_of("docs/studies/clouds-wall.md", "the bias is also less than () mm")
     assert 1e3 * abs(off.mean()) < float(most_mm)
     assert np.mean(np.abs(off) < 0.005) > 0.995
     assert wall.masked_share[0] < 0.4
@@ -425,7 +425,7 @@ def test_clutter_of_a_sphere_moves_no_radius(figure):  # simulation: rays
     off = np.concatenate(off)
     figure("cells of a cloud of a sphere: bias", f"{1e3 * off.mean():.3f} mm")
     figure("cells of a cloud of a sphere: masked", f"{100 * wall.masked_share[0]:.0f} %")
-    (most_mm,) = figures_of("docs/clouds-wall.md", "the bias is also less than () mm")
+    (most_mm,) = figures_of("docs/studies/clouds-wall.md", "the bias is also less than () mm")
     assert 1e3 * abs(off.mean()) < float(most_mm)
     assert np.mean(np.abs(off) < 0.006) > 0.995
     assert wall.masked_share[0] < 0.4
@@ -451,7 +451,7 @@ def test_sd_of_readings_holds_for_waves_of_noise(name, figure):  # simulation: r
     ratio = np.std(error - error.mean()) / np.sqrt(np.mean(readings.sd_m**2))
     figure(f"readings of a cloud, noise {name}: scatter over sd", f"{ratio:.2f}")
     noise_mm, most = figures_of(
-        "docs/clouds-wall.md",
+        "docs/studies/clouds-wall.md",
         "For white noise, and for noise of () mm that is correlated along a scan line or common to "
         "adjacent lines, readings scatter by at most () of `sd_m`",
     )

@@ -205,7 +205,8 @@ def test_the_example_comes_back(tmp_path):
                      "--instrument", "TS-4"]) == 0  # fmt: skip
         volume = tankcal.run(tankcal.load(job)).at(9.0).value_m3
         ppm, finer_mm = figures_of(
-            "docs/import.md", "gives its table within () ppm with readings of () mm or finer"
+            "docs/studies/import.md",
+            "gives its table within () ppm with readings of () mm or finer",
         )
         assert finer_mm == "0.1"
         assert volume == pytest.approx(truth, rel=1e-6 * float(ppm))

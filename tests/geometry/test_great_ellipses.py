@@ -193,7 +193,7 @@ def test_intervals_of_random_ellipsoids(figure):
 def test_intervals_of_ten_thousand_random_ellipsoids(figure):
     held = random_intervals(np.random.default_rng(2552), THREE, 10_000, 0.005).mean()
     axes, sd_mm, stated = figures_of(
-        "docs/spheres.md",
+        "docs/studies/spheres.md",
         "(axes within () %), with three perpendicular circles and () mm, 95 % intervals held () %",
     )
     assert (axes, sd_mm) == ("0.1", "5")

@@ -146,7 +146,7 @@ def test_page_has_every_result_and_keeps_its_prose():
 
 
 def test_kept_page_says_on_what_it_was_made():
-    text = (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/studies/benchmarks.md").read_text(encoding="utf-8")
     inside = text.partition(page.BEGIN)[2].partition(page.END)[0]
     for what in ("day", "tankcal", "processor", "kernel", "Python", "numpy", "BLAS"):
         assert f"| {what} | " in inside
@@ -162,7 +162,7 @@ def test_site_shows_the_run_that_was_made_with_it(tmp_path, monkeypatch):
     results = tmp_path / "benchmarks.json"
     results.write_text(json.dumps(results_of(Row("a task of this run", "", (1.0,)))))
     monkeypatch.setattr(stage, "RESULTS", results)
-    kept = (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8")
+    kept = (ROOT / "docs/studies/benchmarks.md").read_text(encoding="utf-8")
     assert "a task of this run" not in kept
     assert "| a task of this run |" in stage.with_results(kept)
 

@@ -12,7 +12,7 @@ from page_sessions import ROOT
 
 from tankcal.job.plausibility_table import TABLE
 
-GENERATED = {"docs/benchmarks.md", "docs/job-format.md", "docs/saved-keys.md"}
+GENERATED = {"docs/studies/benchmarks.md", "docs/job-format.md", "docs/saved-keys.md"}
 PAGES = sorted(
     {
         str(path.relative_to(ROOT))

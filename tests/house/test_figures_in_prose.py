@@ -219,7 +219,7 @@ def test_figures_of_angles():
     )
     assert 100 * (math.hypot(1, lean / 100) - 1) == pytest.approx(percent, abs=5e-4)
     printed = figures_of(
-        "docs/tangents.md",
+        "docs/studies/tangents.md",
         "a sight of () seconds of arc over a tangent of () m contributes () mm to a radius, and "
         "sixteen sights per level () mm",
     )
@@ -227,7 +227,7 @@ def test_figures_of_angles():
     single = 1000 * angle * arcsec * length
     assert agree([single, single / 4], printed[2:])
     wave, radius, ppm = figures_as_numbers(
-        "docs/tangents.md", "A wave of () mm on () m is then () ppm of the volume"
+        "docs/studies/tangents.md", "A wave of () mm on () m is then () ppm of the volume"
     )
     assert 2e3 * wave / radius == pytest.approx(ppm, abs=0.5)
     angle, ppm = figures_as_numbers(
@@ -238,7 +238,7 @@ def test_figures_of_angles():
 
 def test_widening_of_rings():
     printed = figures_of(
-        "docs/rings.md",
+        "docs/studies/rings.md",
         "p R² / (E t). This is () mm for R () m, () bar and () mm, and () mm for R () m, "
         "() bar and () mm (E = 206 GPa)",
     )
@@ -246,7 +246,7 @@ def test_widening_of_rings():
         radius, bar, plate = map(float, sizes)
         assert agree([1000 * bar * 1e5 * radius**2 / (206e9 * plate / 1000)], [bulge])
     of_upright, factor, radius = figures_as_numbers(
-        "docs/rings.md", "(() m), multiplied by sqrt(R / 7.5 m): by () for R () m"
+        "docs/studies/rings.md", "(() m), multiplied by sqrt(R / 7.5 m): by () for R () m"
     )
     assert of_upright == UPRIGHT_M
     assert math.sqrt(radius / UPRIGHT_M) == pytest.approx(factor, abs=0.05)
@@ -298,7 +298,8 @@ def test_volumes_of_strapped_spheres():
     equator = ball(*3 * [float(a)])
     assert agree([equator, 100 * (equator / volume - 1)], printed)
     printed = figures_of(
-        "docs/spheres.md", "An error of () mm on each of three circles is () % of the volume"
+        "docs/studies/spheres.md",
+        "An error of () mm on each of three circles is () % of the volume",
     )
     u = math.sqrt(3) * float(printed[0]) / 1000 / lengths[0]
     assert agree([100 * u], printed[1:])

@@ -155,7 +155,7 @@ LIMITS = [
         "If it is blank for a vertical tank, () mm is assumed",
         [MM * typical_shape_m()],
     ),
-    ("docs/strapping.md", "The default of () mm is not taken", [MM * typical_shape_m()]),
+    ("docs/studies/strapping.md", "The default of () mm is not taken", [MM * typical_shape_m()]),
     (
         "docs/strapping.md",
         "pull, assumed ± () %; friction, assumed ± () % of its value",
@@ -301,7 +301,7 @@ LIMITS = [
         [MM * HITS["weld_distance_m"]],
     ),
     (
-        "docs/tangents.md",
+        "docs/studies/tangents.md",
         "with more than () of its amplitude, if a level",
         [TANGENTS["wave_in_radius"]],
     ),
@@ -338,7 +338,7 @@ LIMITS = [
         [PERCENT * circles.OVALITY_SHARE],
     ),
     (
-        "docs/spheres.md",
+        "docs/studies/spheres.md",
         "- slow waves l⁻³ of () mm; - plates and seams of () and () m of () mm each; - a band of "
         "() mm at the equator",
         [
@@ -634,64 +634,68 @@ LIMITS += [
         [PERCENT * (1 - clouds_bottom.UNSEEN)],
     ),
     (
-        "docs/clouds-wall.md",
+        "docs/studies/clouds-wall.md",
         "occupied if it holds () % of the fullest class",
         [PERCENT * growing.OCCUPIED],
     ),
     (
-        "docs/clouds-wall.md",
+        "docs/studies/clouds-wall.md",
         "belong to the wall if they lie within () mm of it (() mm more for each metre",
         [MM * growing.PATCH_STEP_M, MM * growing.PATCH_SLOPE],
     ),
     (
-        "docs/clouds-wall.md",
+        "docs/studies/clouds-wall.md",
         "deviates by three standard deviations and () mm",
         [MM * growing.LEAST_TREND_M],
     ),
     (
-        "docs/clouds-wall.md",
+        "docs/studies/clouds-wall.md",
         "Two surfaces are refused where () % of the cells of most sectors show both, or where "
         "another connected surface has () % of the cells",
         [PERCENT * deciding.TWO_SURFACES, PERCENT * deciding.RIVAL],
     ),
     (
-        "docs/clouds-wall.md",
+        "docs/studies/clouds-wall.md",
         "(inwards for scans from outside) in () % of its coarse cells",
         [PERCENT * cells.REAR_SHARE],
     ),
     (
-        "docs/clouds-wall.md",
+        "docs/studies/clouds-wall.md",
         "without a step in () % of the rows",
         [PERCENT * cells.LEAVING_SHARE],
     ),
     (
-        "docs/clouds-wall.md",
+        "docs/studies/clouds-wall.md",
         "accepted with a radius within () % of the nominal radius",
         [PERCENT * start.WIDE],
     ),
     (
-        "docs/clouds-wall.md",
+        "docs/studies/clouds-wall.md",
         "any surface whose radius differs by more than () %",
         [PERCENT * start.WIDE],
     ),
-    ("docs/clouds-wall.md", "A radius that differs by more than () % is", [PERCENT * start.WIDE]),
     (
-        "docs/clouds-wall.md",
+        "docs/studies/clouds-wall.md",
+        "A radius that differs by more than () % is",
+        [PERCENT * start.WIDE],
+    ),
+    (
+        "docs/studies/clouds-wall.md",
         "thinner than () mm counts as wall",
         [MM * growing.PATCH_STEP_M],
     ),
     (
-        "docs/clouds-wall.md",
+        "docs/studies/clouds-wall.md",
         "nor is a weld under () mm",
         [MM * features.LEAST_WELD_M],
     ),
     (
-        "docs/clouds-wall.md",
+        "docs/studies/clouds-wall.md",
         "A second surface over less than () % of the cells",
         [PERCENT * deciding.RIVAL],
     ),
     (
-        "docs/clouds-wall.md",
+        "docs/studies/clouds-wall.md",
         "A layer of () mm over the plan of a tank of () m is () % of its volume",
         [1, 8, PERCENT * 1e-3 / 8],
     ),
@@ -712,12 +716,12 @@ LIMITS += [
     ),
     ("docs/clouds-job.md", "| `u_incidence_mm` | () mm at 60°", [registers.USUAL_INCIDENCE_MM]),
     (
-        "docs/clouds-wall.md",
+        "docs/studies/clouds-wall.md",
         "are counted in classes of () mm. The range is () m, or () of the radius",
         [MM * floor_cells.BIN_M, floor_cells.LEAST_REACH_M, floor_cells.REACH],
     ),
     (
-        "docs/clouds-wall.md",
+        "docs/studies/clouds-wall.md",
         "meet the foot of the shell within () m (or () % of the radius) and appear in () % of the",
         [
             cloud_bottom.FOOT_M,
@@ -726,13 +730,13 @@ LIMITS += [
         ],
     ),
     (
-        "docs/clouds-wall.md",
+        "docs/studies/clouds-wall.md",
         "connected cells () mm or more below the",
         [MM * cloud_bottom.LEAST_PIT_M],
     ),
-    ("docs/clouds-wall.md", "and not steeper than ().", [growing.STEEPEST]),
+    ("docs/studies/clouds-wall.md", "and not steeper than ().", [growing.STEEPEST]),
     (
-        "docs/clouds-wall.md",
+        "docs/studies/clouds-wall.md",
         "a roof over () % of the plan or more",
         [PERCENT * cloud_bottom.ROOF_SHARE],
     ),

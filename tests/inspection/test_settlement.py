@@ -116,7 +116,7 @@ def test_limits_of_example_b(count, inches):
     in_si = Strength(272 * 0.3048, 66.4 * 0.3048, yield_pa=36e3 * 6894.757, e_pa=30e6 * 6894.757)
     assert_allclose(12 * limits_of_b(count, in_feet), inches, atol=0.0051)
     printed = figures_of(
-        "docs/settlement.md",
+        "docs/studies/settlement.md",
         "the limit is (), (), (), (), (), () in with (), (), (), (), (), () points",
     )
     assert float(printed[printed[6:].index(str(count))]) == inches

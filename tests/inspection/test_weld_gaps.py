@@ -96,7 +96,7 @@ def test_peaks_are_recovered(shell, found, figure):  # truth: the page's formula
             off.append(gap.gap_mm - truth)
             assert gap.azimuth_deg == pytest.approx(np.degrees(peak.azimuth_rad))
     (within_mm,) = figures_of(
-        "docs/inspection-welds.md", "of -5 mm at the same density | correct within () mm |"
+        "docs/studies/inspection-welds.md", "of -5 mm at the same density | correct within () mm |"
     )
     assert np.abs(off).max() < float(within_mm) == RECOVERED_MM
     figure("gaps of peaks of 8 and -5 mm, found less true, mm", np.round(off, 2).tolist())
@@ -394,7 +394,7 @@ def test_peak_in_ten_million_points(figure):  # the whole tank of the page
     peaking = found.figures[0]
     off = peaking.value_mm - 1000 * tank.gap(peaks[15])
     (within_mm,) = figures_of(
-        "docs/inspection-welds.md",
+        "docs/studies/inspection-welds.md",
         "in 1e7 points on R 6.5 m, H 10 m | correct within () mm |",
     )
     assert abs(off) < float(within_mm) == RECOVERED_MM
@@ -427,7 +427,7 @@ def test_coverage_with_noise_that_hangs_together(knots_m, figure):
             if not peak.size_m:
                 flat.append((abs(gap.gap_mm), gap.U_mm))
     (least,) = figures_of(
-        "docs/inspection-welds.md", "shared within 0.06, 0.15, 0.3 m | at least () % |"
+        "docs/studies/inspection-welds.md", "shared within 0.06, 0.15, 0.3 m | at least () % |"
     )
     assert np.mean(inside) >= int(least) / 100
     knots = f"knots of noise every {knots_m} m"

@@ -67,7 +67,7 @@ def test_many_steps_leave_the_scale_without_bias(tmp_path, case, tanks):
     scale.
     """
     figures = figures_of(
-        "docs/liquid.md",
+        "docs/studies/liquid.md",
         "| vertical tanks, () steps, meter () %, and () steps, meter () %: mean error of",
     )
     steps, percent = (value_of(figure) for figure in figures[2 * case : 2 * case + 2])

@@ -69,7 +69,9 @@ def test_intervals_hold_on_rings_that_are_not_the_model(base_job, figure):
 
 @pytest.mark.study
 def test_intervals_hold_on_rings_that_are_not_the_model_study(base_job, figure):
-    (least,) = figures_of("docs/rings.md", "intervals held at least () of the volumes, within")
+    (least,) = figures_of(
+        "docs/studies/rings.md", "intervals held at least () of the volumes, within"
+    )
     assert float(least) == 0.94
     count = draws(250, 1000)  # fewer have too large a chance to exceed the limit of rms
     for shares in ((0.2, 0.8), (0.1, 0.5, 0.9)):

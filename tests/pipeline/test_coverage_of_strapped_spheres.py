@@ -74,7 +74,7 @@ def test_intervals_hold_on_strapped_spheres(figure):
 def test_intervals_hold_on_strapped_spheres_study(figure):
     held = study(draws(10, 150), figure, 17)
     *stated, full = figures_of(
-        "docs/spheres.md", "held () of the totals and () of the rows of () spheres"
+        "docs/studies/spheres.md", "held () of the totals and () of the rows of () spheres"
     )
     assert shares_agree([held[:, -1].mean(), held.mean()], stated, len(held), int(full))
     least = LEAST_HELD - 3 * np.sqrt(0.95 * 0.05 / len(held))

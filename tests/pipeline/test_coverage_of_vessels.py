@@ -164,7 +164,9 @@ def test_intervals_hold_on_rings_of_vessels_study(base_job, figure, shares):  # 
     found = [errors_of_ring(seed, base_job, shares) for seed in range(count)]
     held, wide = judge(found, f"welded rings, {len(shares)} straps", figure)
     assert held > least(count)
-    (ratio,) = figures_of("docs/rings.md", "U of the full tank is at most () times 1.96 rms errors")
+    (ratio,) = figures_of(
+        "docs/studies/rings.md", "U of the full tank is at most () times 1.96 rms errors"
+    )
     assert float(ratio) == MOST_WIDE_OF_RINGS
     # the ratio of 12 tanks is known to 20 %
     assert wide < MOST_WIDE_OF_RINGS * (1 + draws(3, 0) / np.sqrt(2 * count))
@@ -175,6 +177,8 @@ def test_intervals_hold_on_rings_of_vessels_study(base_job, figure, shares):  # 
 def test_intervals_hold_on_spheres_of_vessels_study(figure, family):
     count = draws(6, 200)
     found = [errors_of_ball(seed, family) for seed in range(count)]
-    (stated,) = figures_of("docs/spheres.md", "held at least () of the volumes of each family")
+    (stated,) = figures_of(
+        "docs/studies/spheres.md", "held at least () of the volumes of each family"
+    )
     assert float(stated) == LEAST_HELD
     assert judge(found, f"spheres, {family}", figure)[0] > least(count)

@@ -318,5 +318,5 @@ def test_three_hundred_increments_take_less_than_two_seconds(tmp_path):
     run(job)  # what loads once
     start = time.process_time()
     run(job)
-    (most_s,) = figures_of("docs/liquid.md", "| processor time | less than () s |")
+    (most_s,) = figures_of("docs/studies/liquid.md", "| processor time | less than () s |")
     assert time.process_time() - start < float(most_s)

@@ -42,21 +42,24 @@ FAULTS = {
 
 
 ROWS = {  # of upright tanks, then of lying tanks: named, right, number of kinds
-    "meter": ("docs/liquid.md", "| meter 0.1 % | (), right () (()) | (), right () (()) |"),
-    "radii": ("docs/liquid.md", "| radii 2 mm | (), right () (()) | (), right () (()) |"),
-    "dip": ("docs/liquid.md", "| one dip 10 mm | (), right () (()) | (), right () (()) |"),
-    "dip_zero": ("docs/liquid.md", "| zero of all dips 2 mm | () | (), right () (()) |"),
-    "batch": ("docs/liquid.md", "| a batch missing | (), right () (()) | (), right () (()) |"),
+    "meter": ("docs/studies/liquid.md", "| meter 0.1 % | (), right () (()) | (), right () (()) |"),
+    "radii": ("docs/studies/liquid.md", "| radii 2 mm | (), right () (()) | (), right () (()) |"),
+    "dip": ("docs/studies/liquid.md", "| one dip 10 mm | (), right () (()) | (), right () (()) |"),
+    "dip_zero": ("docs/studies/liquid.md", "| zero of all dips 2 mm | () | (), right () (()) |"),
+    "batch": (
+        "docs/studies/liquid.md",
+        "| a batch missing | (), right () (()) | (), right () (()) |",
+    ),
     "leak": (
-        "docs/liquid.md",
+        "docs/studies/liquid.md",
         "| a valve that passes, 0.1 m³/h | (), right () (()) | (), right () (()) |",
     ),
     "fahrenheit": (
-        "docs/liquid.md",
+        "docs/studies/liquid.md",
         "| temperatures in Fahrenheit | (), right () (()) | (), right () (()) |",
     ),
     "swapped": (
-        "docs/liquid.md",
+        "docs/studies/liquid.md",
         "| temperatures of meter and tank exchanged | (), right () (()) | (), right () (()) |",
     ),
 }
@@ -201,7 +204,8 @@ def test_sound_jobs_are_hardly_accused(tmp_path, kind):
     job, rng = make(tmp_path / "job", 2.1e-4), np.random.default_rng(12)
     accused = sum(told(job, truth, Fault(), rng)[0] > 0 for _ in range(50))
     jobs, most = figures_of(
-        "docs/liquid.md", "Of () fault-free jobs of each kind, a cause is named in at most ()"
+        "docs/studies/liquid.md",
+        "Of () fault-free jobs of each kind, a cause is named in at most ()",
     )
     assert jobs == "50"
     assert accused <= int(most)

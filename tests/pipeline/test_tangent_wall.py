@@ -107,7 +107,7 @@ def test_exact_tangents_give_the_table(tmp_path, radius, figure):
     figure(f"volume by exact tangents, {radius.__name__}", f"{1e6 * off:+.2f} ppm")
     mean, common = result.touching.hull.excess_m.mean(), result.touching.hull.common_sd_m.mean()
     radius_m, ppm, _, ppm_of_oval = figures_of(
-        "docs/tangents.md",
+        "docs/studies/tangents.md",
         "a leaning circle of () m is reproduced within () ppm of its volume, an oval of () mm "
         "within () ppm",
     )

@@ -85,12 +85,12 @@ def test_three_distances_suffice_two_in_a_plane_do_not(shape_sds, figure):
     for name, one in (("8", eight), ("H H V", three), ("V V", upright), ("H H", level)):
         figure(f"sds of height and widths, tapes {name} (mm)", np.round(one, 2))
     printed = {
-        "eight": figures_of("docs/planning.md", "| eight | () | (), () |"),
+        "eight": figures_of("docs/studies/planning.md", "| eight | () | (), () |"),
         "three": figures_of(
-            "docs/planning.md", "| two level, not parallel, and one upright | () | (), () |"
+            "docs/studies/planning.md", "| two level, not parallel, and one upright | () | (), () |"
         ),
-        "level": figures_of("docs/planning.md", "| two level | () | (), () |"),
-        "upright": figures_of("docs/planning.md", "| two upright | () | (), () |"),
+        "level": figures_of("docs/studies/planning.md", "| two level | () | (), () |"),
+        "upright": figures_of("docs/studies/planning.md", "| two upright | () | (), () |"),
     }
     for name, sds in (("eight", eight), ("three", three), ("level", level), ("upright", upright)):
         assert agree(sds, printed[name]), name
@@ -150,7 +150,7 @@ def test_at_least_three_rays_a_point(figure):
     mean = {n: float(table.redundancy[(count == n) & free].mean()) for n in (2, 3, 4)}
     figure("mean redundancy of image coordinates by rays", mean)
     printed = figures_of(
-        "docs/planning.md",
+        "docs/studies/planning.md",
         "of an image coordinate is () with two rays, () with three, and () with four",
     )
     assert agree(mean.values(), printed)

@@ -28,7 +28,7 @@ def test_hundreds_of_surveys_scatter_as_predicted(prediction, figure):
     shown(found, figure)
     assert not found.failed
     (percent,) = figures_of(
-        "docs/planning.md", "of all coordinates agrees with the prediction within () %"
+        "docs/studies/planning.md", "of all coordinates agrees with the prediction within () %"
     )
     assert found.ratio == pytest.approx(1.0, abs=int(percent) / 100)
     assert found.volume_ratio == pytest.approx(1.0, abs=4 / np.sqrt(2 * 499))

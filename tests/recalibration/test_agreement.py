@@ -66,7 +66,7 @@ def test_one_table_in_twenty_is_beyond_one(share, figure):
     rate = 100 * np.mean(np.abs(E_n) > 1)
     figure(f"|E_n| > 1, c = {c:.2f}", f"{rate:.2f} % of {count}")
     pairs, *stated = figures_of(
-        "docs/compare.md",
+        "docs/studies/compare.md",
         "For () pairs of strapped shells with tapes of a common master, |E_n| > 1 occurred in (), "
         "() and () % (c (), (), ())",
     )

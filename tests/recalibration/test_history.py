@@ -42,7 +42,9 @@ def test_a_table_on_another_basis_gives_its_radii():
     found = history_of(
         [DatedTable(old, "0", date(1999, 5, 20)), dated_table(0)], courses=COURSES
     )  # fmt: skip
-    (near_um,) = figures_of("docs/history.md", "without head and with another zero, agree to () µm")
+    (near_um,) = figures_of(
+        "docs/studies/compare.md", "without head and with another zero, agree to () µm"
+    )
     np.testing.assert_allclose(
         radii_in(found, 1), radii_of_year(0) - 0.0005, rtol=0, atol=1e-6 * float(near_um)
     )
@@ -64,7 +66,7 @@ def test_drawn_tables_lie_within_their_U(figure):
     inside = np.mean(np.abs(off) <= 1)
     figure("history, radii within U of 40 tables", float(inside))
     count, percent = figures_of(
-        "docs/history.md",
+        "docs/studies/compare.md",
         "For () tables with errors drawn from their stated u, () % of the radii are within U",
     )
     assert int(count) == len(tables)

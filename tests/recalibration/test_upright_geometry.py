@@ -72,19 +72,21 @@ def test_published_example_with_head():
     assert off.tolist() == [-0.9, -1.7, -3.8, -6.3, -7.3]
     u_density, u_radii = found.independent_u
     printed = figures_of(
-        "docs/read-table.md",
+        "docs/studies/read-table.md",
         "With independent errors it gives (), (), (), (), () µm and () ± () kg/m3, t = ()",
     )
     density = found.density_kg_m3.value
     assert agree([*(1e6 * u_radii), density, u_density, density / u_density], printed)
     assert agree(
         [found.density_kg_m3.u],
-        figures_of("docs/read-table.md", "The larger of both values is u: () kg/m3 for S-1"),
+        figures_of(
+            "docs/studies/read-table.md", "The larger of both values is u: () kg/m3 for S-1"
+        ),
     )
     course_l, step_l, rows = map(
         value_of,
         figures_of(
-            "docs/read-table.md",
+            "docs/studies/read-table.md",
             "of a course of () L/cm increase by () L a row and fall back every () rows",
         ),
     )
@@ -102,7 +104,7 @@ def test_published_example_with_its_head_left_out():
     assert (1e3 * (radii - radii_of_s1())).round(2).tolist() == [0.16, 0.66, 1.16, 1.70, 2.22]
     assert (round(1000 * rms, 2), round(1000 * largest, 1)) == (1.61, 3.9)
     printed = figures_of(
-        "docs/read-table.md",
+        "docs/studies/read-table.md",
         "has small residuals (() L of () in tank S-1), but its radii are wrong by () mm",
     )
     assert agree([1000 * rms, 1e3 * (radii - radii_of_s1()).max()], printed[::2])
@@ -129,10 +131,10 @@ def test_published_u_of_one_ring(step, quantum, u_mm):
     u = np.sqrt(np.linalg.inv(design.T @ design)[1, 1]) * quantum / np.sqrt(12)
     assert_allclose(1000 * u, u_mm, rtol=0.06)
     stated = {
-        (0.001, 0.001): figures_of("docs/read-table.md", "| 1 mm to 1 L | () mm |"),
-        (0.01, 0.001): figures_of("docs/read-table.md", "| 1 cm to 1 L | () mm |"),
-        (0.01, 0.01): figures_of("docs/read-table.md", "| 1 cm to 10 L | () mm |"),
-        (0.1, 1.0): figures_of("docs/read-table.md", "| 1 dm to 1 m³ | () mm; in tank S-1"),
+        (0.001, 0.001): figures_of("docs/studies/read-table.md", "| 1 mm to 1 L | () mm |"),
+        (0.01, 0.001): figures_of("docs/studies/read-table.md", "| 1 cm to 1 L | () mm |"),
+        (0.01, 0.01): figures_of("docs/studies/read-table.md", "| 1 cm to 10 L | () mm |"),
+        (0.1, 1.0): figures_of("docs/studies/read-table.md", "| 1 dm to 1 m³ | () mm; in tank S-1"),
     }
     assert float(*stated[step, quantum]) == u_mm
 

@@ -28,7 +28,7 @@ def test_intervals_hold(run):
     truth = fill_tanks(np.random.default_rng(5), 10_000, survey)
     share = held(truth, Calibrator(survey))
     count, *bounds = figures_of(
-        "docs/liquid.md",
+        "docs/studies/liquid.md",
         "95 % intervals of rows and deliveries, () filled tanks, three runs, run effect unknown "
         "(200 and 300 ppm; meter 300) | simulation with a physical truth | () to () % |",
     )
@@ -43,7 +43,7 @@ def test_intervals_do_not_hold_of_simpler_models():
     survey = Survey(meter=150e-6)
     truth = fill_tanks(np.random.default_rng(5), 3000, survey)
     count, meter, most = figures_of(
-        "docs/liquid.md",
+        "docs/studies/liquid.md",
         "| () with meter () ppm, the run effect left out | | as low as () % or less |",
     )
     assert (int(count), int(meter)) == (3000, 150)
