@@ -115,15 +115,16 @@ def list_files():
     return sorted(pages) + sorted((ROOT / "tankcal").rglob("*.py"))
 
 
-def compare_with_limits(counts, path, is_lowering, remedy):
+def compare_with_limits(counts, path, is_lowering, remedy, unnamed=sys.maxsize):
     """Print counts above their limits in a TOML file; 1 if there are any, else 0.
 
-    With is_lowering, and no count above its limit, the counts become the limits.
+    With is_lowering, and no count above its limit, the counts become the limits. `unnamed` is the
+    limit of counts that the file does not name.
     """
     limits = tomllib.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
-    above = {name: n for name, n in counts.items() if n > limits.get(name, sys.maxsize)}
+    above = {name: n for name, n in counts.items() if n > limits.get(name, unnamed)}
     for name, count in sorted(above.items()):
-        print(f"{name}: {count}, limit {limits[name]}; {remedy} (CONTRIBUTING.md)")
+        print(f"{name}: {count}, limit {limits.get(name, unnamed)}; {remedy} (CONTRIBUTING.md)")
     if is_lowering and not above:
         lines = [f'"{name}" = {count}\n' for name, count in sorted(counts.items())]
         heading = "# Written with --lower by the script of this name: counts may only fall\n"
