@@ -26,22 +26,25 @@ GREEDY = [
 ROWS_OF_PAGE = {  # numbers of points, then errors in L; step
     lying: (
         figures_of(
-            "docs/exports.md",
+            "docs/studies/exports.md",
             "| lying () x 10 m, flat ends, 1 mm | (), (), (), (), () | (), (), (), (), () |",
         ),
         0.001,
     ),
     ellipsoidal: (
         figures_of(
-            "docs/exports.md",
+            "docs/studies/exports.md",
             "| lying () x 10 m, ellipsoidal ends of 0.6 m, 1 mm | (), (), () | (), (), () |",
         ),
         0.001,
     ),
-    sphere: (figures_of("docs/exports.md", "| sphere, D () m, 5 mm | (), () | (), () |"), 0.005),
+    sphere: (
+        figures_of("docs/studies/exports.md", "| sphere, D () m, 5 mm | (), () | (), () |"),
+        0.005,
+    ),
     tank_s1: (
         figures_of(
-            "docs/exports.md",
+            "docs/studies/exports.md",
             "| upright, head of () kg/m3, deadwood, 4 mm | (), (), (), () | (), (), (), () |",
         ),
         0.004,

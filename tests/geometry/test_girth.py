@@ -125,7 +125,7 @@ def test_the_excess_of_generated_walls_is_within_its_standard_uncertainty(tmp_pa
     # missed by so many ppm; all others are well within their uncertainty
     assert np.sqrt(np.mean(np.sort(away[0])[:-1] ** 2)) < 1.0
     count, smallest, largest, fewest, most, ppm, percent = map(value_of, figures_of(
-        "docs/strapping.md",
+        "docs/studies/strapping.md",
         "On () generated walls (six families, R () to () m, () to () points per ring), no error of "
         "the area term exceeds () ppm, and at least () % are within 1.96 standard uncertainties",
     ))  # fmt: skip

@@ -135,7 +135,7 @@ def figures_as_numbers(page, sentence):
 
 def test_figures_of_a_tape():
     printed = figures_of(
-        "docs/strapping.md",
+        "docs/studies/strapping.md",
         "A tape of () N/m (13 mm wide, 0.2 mm thick) at () N over a free span of (), () or () m "
         "reads (), () or () mm too long",
     )
@@ -143,19 +143,19 @@ def test_figures_of_a_tape():
     sag = [1000 * sag_of(weight, span, tension) for span in spans]
     assert agree(sag, printed[5:])
     off_mm, radius, span, most_um = figures_as_numbers(
-        "docs/strapping.md",
+        "docs/studies/strapping.md",
         "Beside an obstruction of () mm on R = () m, where the tape is free over () m on each "
         "side, the sag is less than () µm",
     )
     assert span == pytest.approx(math.sqrt(2 * radius * off_mm / 1000), abs=0.05)
     assert 1e6 * sag_of(weight, span, tension) < most_um
     known, of_sag = figures_as_numbers(
-        "docs/strapping.md", "a span known to () % gives a sag known to () %"
+        "docs/studies/strapping.md", "a span known to () % gives a sag known to () %"
     )
     assert sag_of(1, 1 + known / 100, 1) / sag_of(1, 1, 1) - 1 == pytest.approx(
         of_sag / 100, rel=0.02
     )
-    printed = figures_of("docs/strapping.md", "weighs more than half the tension (() %)")
+    printed = figures_of("docs/studies/strapping.md", "weighs more than half the tension (() %)")
     assert agree([100 * DEEPEST**2 / 80], printed)
     slope, percent = figures_as_numbers(
         "docs/strapping.md", "(a lean of 1 in () makes a horizontal cut () % larger)"
@@ -170,7 +170,7 @@ def sag_of(weight_n_per_m, span_m, tension_n):
 def test_chance_of_equal_repeats():
     """Two normal readings, rounded: equal if the difference is in the triangle of one step."""
     sd, *parts = figures_as_numbers(
-        "docs/strapping.md",
+        "docs/studies/strapping.md",
         "Two readings of () mm are equal in () % of cases if written to () mm, and in () % if "
         "written to () mm",
     )
@@ -184,7 +184,7 @@ def test_chance_of_equal_repeats():
 
 def test_area_term_of_declared_shapes():
     printed = figures_of(
-        "docs/strapping.md",
+        "docs/studies/strapping.md",
         "On R = () m, a shape of () mm reduces the volume by () ppm with a standard uncertainty of "
         "() ppm. A shape of () mm reduces it by () ppm, with () ppm. The scatter of the draws "
         "(() and () ppm)",

@@ -115,10 +115,10 @@ LIMITS = [
         "at most () kB and () pixels along a side",
         [letterhead.MAX_LOGO_BYTES / 1000, letterhead.MAX_LOGO_PIXELS],
     ),
-    ("docs/report.md", "A table of up to () rows is not divided", [page_constant("short")]),
-    ("docs/report.md", "Tables end after () rows", [quality.MOST_ROWS]),
+    ("docs/report-code.md", "A table of up to () rows is not divided", [page_constant("short")]),
+    ("docs/certificate.md", "Tables end after () rows", [quality.MOST_ROWS]),
     (
-        "docs/report.md",
+        "docs/report-code.md",
         "at most about twice this value (() mL if the largest u is () m³)",
         [2e6 * calculator_data.BEND, 1],
     ),
@@ -214,7 +214,7 @@ LIMITS = [
     ),
     ("docs/strapping.md", "and caps over () mm", [tapes.THICK_WELD_MM]),
     (
-        "docs/strapping.md",
+        "docs/studies/strapping.md",
         "than chance explains (under () %)",
         [PERCENT * tape_warnings.BY_CHANCE],
     ),
@@ -230,7 +230,7 @@ LIMITS = [
         [MM * HITS["weld_distance_m"]],
     ),
     (
-        "docs/wall-hits.md",
+        "docs/studies/wall-hits.md",
         "until no hit moves by () mm (one or two passes)",
         [MM * hits_wall.SETTLED_M],
     ),
@@ -266,12 +266,12 @@ LIMITS = [
         [PPM * instruments.DOUBTFUL_CORRECTION],
     ),
     (
-        "docs/wall-hits.md",
+        "docs/studies/wall-hits.md",
         "until no distance from the solid changes by () mm",
         [MM * inside_solid.SETTLED_M],
     ),
     (
-        "docs/wall-hits.md",
+        "docs/studies/wall-hits.md",
         "over () % of the radius plus () mm off the wall",
         [PERCENT * scanned_solids.NEVER_PART, MM * scanned_solids.NEVER_M],
     ),
@@ -281,17 +281,17 @@ LIMITS = [
         [PERCENT * LYING["most_rejected_share"], PERCENT * LYING["least_length_share"]],
     ),
     (
-        "docs/wall-hits.md",
+        "docs/studies/wall-hits.md",
         "counts with at least its prior median of () mm",
         [MM * COMPONENT["common ovality"].median_m],
     ),
     (
-        "docs/wall-hits.md",
+        "docs/studies/wall-hits.md",
         "do not settle within () mm in four passes",
         [MM * hits_wall.UNSETTLED_M],
     ),
     (
-        "docs/wall-hits.md",
+        "docs/studies/wall-hits.md",
         "if the other order fits () or () times better",
         [untied.MIRRORED, untied.EXCHANGED],
     ),
@@ -434,18 +434,22 @@ LIMITS += [
         ],
     ),
     (
-        "docs/ticket.md",
+        "docs/studies/ticket.md",
         "temperature in degrees Fahrenheit | warning above () °C for a light product",
         [quantity.HOTTEST_C],
     ),
-    ("docs/ticket.md", "S&W as a fraction | warning below () %", [quantity.LEAST_SW_PERCENT]),
     (
-        "docs/ticket.md",
+        "docs/studies/ticket.md",
+        "S&W as a fraction | warning below () %",
+        [quantity.LEAST_SW_PERCENT],
+    ),
+    (
+        "docs/studies/ticket.md",
         "differs from the table by more than () mm",
         [MM * quantity.MOST_REFERENCE_SHIFT_M],
     ),
     (
-        "docs/ticket.md",
+        "docs/studies/ticket.md",
         "`CNP-6-70` differs from D1250 at 20 °C: by () % for gasoline of () kg/m³ at () °C",
         [
             PERCENT
@@ -495,7 +499,7 @@ LIMITS += [
     ),
     ("docs/gauge.md", "Below () %, the residuals alone", [PERCENT * deviation.LEAST_PROBABILITY]),
     (
-        "docs/read-table.md",
+        "docs/studies/read-table.md",
         "deviate by more than () % of the highest volume",
         [PERCENT * read_table.WORST_FIT],
     ),
@@ -510,10 +514,10 @@ LIMITS += [
         [PERCENT * comparison.MOST_APART],
     ),
     ("docs/compare.md", "a difference of over () mm and three u", [MM * comparison.LEAST_ZERO_M]),
-    ("docs/compare.md", "(() mm without a limit)", [MM * verdict.USUAL_LIMIT_M]),
-    ("docs/compare.md", "Less than () mm, or two u, counts", [MM * basis.LEAST_ZERO_M]),
+    ("docs/studies/compare.md", "(() mm without a limit)", [MM * verdict.USUAL_LIMIT_M]),
+    ("docs/studies/compare.md", "Less than () mm, or two u, counts", [MM * basis.LEAST_ZERO_M]),
     (
-        "docs/compare.md",
+        "docs/studies/compare.md",
         "For example, 0.70, 0.46 and 0.60 m³ give () with c = 0 and () with 0.5",
         [0.70 / math.sqrt(0.46**2 + 0.60**2 - 2 * c * 0.46 * 0.60) for c in (0.0, 0.5)],
     ),
@@ -587,12 +591,12 @@ LIMITS += [
         [0.001, 1, 1 / math.sqrt(12)],
     ),
     (
-        "docs/clouds.md",
+        "docs/studies/clouds-files.md",
         "processes of this machine with at most () GB of memory each",
         [cluster.WORKER_BYTES >> 30],
     ),
     (
-        "docs/clouds.md",
+        "docs/studies/clouds-files.md",
         "Allow () GB of memory for each worker",
         [cluster.WORKER_BYTES >> 30],
     ),
@@ -624,7 +628,7 @@ LIMITS += [
         [PERCENT * clouds_warnings.LEAST_OF_WALL],
     ),
     (
-        "docs/clouds-job.md",
+        "docs/studies/clouds-wall.md",
         "incidences up to ()° and has a level of () %",
         [overlaps.STEEPEST_DEG, PERCENT * overlaps.LEVEL],
     ),
@@ -863,23 +867,23 @@ LIMITS += [
         [PERCENT * wrong_readings.MANY, PERCENT * wrong_readings.LEVEL],
     ),
     ("docs/adjustment.md", "agrees without them (both at () %", [PERCENT * adjust.ALPHA]),
-    ("docs/adjustment.md", "contradict each other beyond () %", [PERCENT * means.LEVEL]),
+    ("docs/studies/adjustment.md", "contradict each other beyond () %", [PERCENT * means.LEVEL]),
     (
         "docs/adjustment.md",
         "(factor √χ²(3): (), (), () for 90, 95, 99 %; the standard ellipsoid holds () %)",
         [*(math.sqrt(stats.chi2.ppf(p, 3)) for p in (0.9, 0.95, 0.99)), 100 * stats.chi2.cdf(1, 3)],
     ),
     ("docs/archive.md", "long tables of more than () MB", [attachments.LARGEST_PACKED / 1e6]),
-    ("docs/camera.md", "with () px added", [coded.SD_FLOOR_PX]),
-    ("docs/camera.md", "`--alpha` ()", [significance.ALPHA]),
+    ("docs/studies/camera.md", "with () px added", [coded.SD_FLOOR_PX]),
+    ("docs/studies/camera.md", "`--alpha` ()", [significance.ALPHA]),
     (
-        "docs/camera.md",
+        "docs/studies/camera.md",
         "with a share below () % (0.7 % in print). Of the parameters that load above () on one "
         "component, the parameter with the smallest loading is dropped. Loadings closer than ()",
         [recommendation.NEGLIGIBLE_PERCENT, recommendation.LOADING, recommendation.ALIKE],
     ),
     (
-        "docs/conventions.md",
+        "docs/studies/methods.md",
         "leaning cylinder, band from () % to () % of the radius (() mm at least). Points more "
         "than () mm from",
         [
@@ -890,11 +894,11 @@ LIMITS += [
         ],
     ),
     (
-        "docs/conventions.md",
+        "docs/studies/methods.md",
         "accepted points that deviates by () mm and () standard",
         [MM * blunders.LEAST_M, blunders.LEAST_W],
     ),
-    ("docs/conventions.md", "rejected points within () mm that", [MM * patches.FARTHEST_M]),
+    ("docs/studies/methods.md", "rejected points within () mm that", [MM * patches.FARTHEST_M]),
     (
         "docs/conventions.md",
         "with conventional weights, () % more for rho = () kg/m3",

@@ -240,17 +240,23 @@ SPOILING = (
 
 
 ROWS_OF_PAGE = {
-    cut_last_row: ("docs/table.md", "| last number cut short | () | () | () | () |"),
-    doubled_row: ("docs/table.md", "| a row twice | () | () | () | () |"),
-    missing_last_row: ("docs/table.md", "| last row missing | () | () | () | () |"),
-    missing_row: ("docs/table.md", "| a row missing | () | () | () | () |"),
-    moved_mark: ("docs/table.md", "| decimal mark moved | () | () | () | () |"),
-    shifted_block: ("docs/table.md", "| a block of rows shifted together | () | () | () | () |"),
-    swapped_digits: ("docs/table.md", "| two digits changed places | () | () | () | () |"),
-    swapped_rows: ("docs/table.md", "| two rows swapped | () | () | () | () |"),
-    thousands_mark: ("docs/table.md", "| a thousands mark in one cell | () | () | () | () |"),
-    wrong_digit: ("docs/table.md", "| one digit wrong | () | () | () | () |"),
-    wrong_height: ("docs/table.md", "| a height wrong | () | () | () | () |"),
+    cut_last_row: ("docs/studies/linter.md", "| last number cut short | () | () | () | () |"),
+    doubled_row: ("docs/studies/linter.md", "| a row twice | () | () | () | () |"),
+    missing_last_row: ("docs/studies/linter.md", "| last row missing | () | () | () | () |"),
+    missing_row: ("docs/studies/linter.md", "| a row missing | () | () | () | () |"),
+    moved_mark: ("docs/studies/linter.md", "| decimal mark moved | () | () | () | () |"),
+    shifted_block: (
+        "docs/studies/linter.md",
+        "| a block of rows shifted together | () | () | () | () |",
+    ),
+    swapped_digits: ("docs/studies/linter.md", "| two digits changed places | () | () | () | () |"),
+    swapped_rows: ("docs/studies/linter.md", "| two rows swapped | () | () | () | () |"),
+    thousands_mark: (
+        "docs/studies/linter.md",
+        "| a thousands mark in one cell | () | () | () | () |",
+    ),
+    wrong_digit: ("docs/studies/linter.md", "| one digit wrong | () | () | () | () |"),
+    wrong_height: ("docs/studies/linter.md", "| a height wrong | () | () | () | () |"),
 }
 
 
@@ -258,12 +264,12 @@ def test_numbers_of_exact_and_of_spoilt_tables_in_the_text():
     exact, shapes = map(
         value_of,
         (
-            *figures_of("docs/table.md", "reports no error in () exact tables"),
-            *figures_of("docs/table.md", "The tables have () shapes"),
+            *figures_of("docs/studies/linter.md", "reports no error in () exact tables"),
+            *figures_of("docs/studies/linter.md", "The tables have () shapes"),
         ),
     )
     assert (exact, shapes) == (len(SHAPES) * len(STEPS) * len(DECIMALS), len(SHAPES))
-    (tables,) = figures_of("docs/table.md", "| () tables, each spoilt in one place |")
+    (tables,) = figures_of("docs/studies/linter.md", "| () tables, each spoilt in one place |")
     assert sum(value_of(figures_of(*row)[0]) for row in ROWS_OF_PAGE.values()) == value_of(tables)
 
 
@@ -358,7 +364,9 @@ def test_how_small_an_error_is_found(tables, figure):
         located[size] = named
         text = f"{100 * seen / each:.0f} % found, {100 * named / each:.0f} % with their row"
         figure(f"linter, {each} errors of {size} in the last digit of a cm table", text)
-    least = figures_of("docs/table.md", "Of errors of 3 units or more, at least () % are detected")
+    least = figures_of(
+        "docs/studies/linter.md", "Of errors of 3 units or more, at least () % are detected"
+    )
     assert located[3] + located[5] + located[10] >= value_of(*least) / 100 * 3 * each
 
 

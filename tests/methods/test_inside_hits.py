@@ -194,7 +194,8 @@ def test_intervals_hold_on_walls_that_are_not_the_model(kind, tmp_path, figure):
     figure(f"inside hits, {kind}: held total, rows", f"{held[:, -1].mean():.3f} {held.mean():.3f}")
     figure(f"inside hits, {kind}: mean U of totals over 1.96 rms errors", f"{wide:.2f}")
     least, count = figures_of(
-        "docs/wall-hits.md", "At least () of the totals and of the rows of () tanks of each kind"
+        "docs/studies/wall-hits.md",
+        "At least () of the totals and of the rows of () tanks of each kind",
     )
     assert float(least) == LEAST_HELD
     assert int(count) == len(found)

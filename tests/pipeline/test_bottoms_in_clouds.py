@@ -183,7 +183,7 @@ def test_volumes_scatter_as_their_shared_columns_say(figure):
     drawn = [volume([moved() for _ in range(3)])[0] for _ in range(200)]
     figure("u of a bottom by three moved scans, said / scatter", f"{predicted / np.std(drawn):.3f}")
     count, percent = figures_of(
-        "docs/clouds-job.md", "u agrees with the scatter of () draws within () %"
+        "docs/studies/clouds-wall.md", "u agrees with the scatter of () draws within () %"
     )
     assert len(drawn) == int(count)
     assert predicted == pytest.approx(np.std(drawn), rel=float(percent) / 100)

@@ -642,7 +642,7 @@ def test_the_frame_of_untied_set_ups_is_a_choice(tmp_path):
         row[1:3] = [100.0 + 0.8 * x - 0.6 * y, -50.0 + 0.6 * x + 0.8 * y]
     second = run(tmp_path / "b", parts)
     (ppm,) = figures_of(
-        "docs/wall-hits.md",
+        "docs/studies/wall-hits.md",
         "Turning the frame of untied set-ups changes volumes by less than () ppm",
     )
     volume_m3 = first.table.volume_m3[-1]

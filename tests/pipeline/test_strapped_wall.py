@@ -284,11 +284,11 @@ def test_sound_courses_are_seldom_asked_whether_they_were_exchanged():
         found = exchanged_courses(outside, plates, range(6))
         named += found is not None and found[:2] in [(1, 4), (1, 5)]
     most, scatter_mm = figures_of(
-        "docs/strapping.md",
+        "docs/studies/strapping.md",
         "For valid books it asks in at most () % (radii of courses that scatter by up to () mm",
     )
     small_mm, least, first, other = figures_of(
-        "docs/strapping.md",
+        "docs/studies/strapping.md",
         "Where courses scatter by up to () mm, it finds at least () % of exchanges of plates of () "
         "and () mm",
     )

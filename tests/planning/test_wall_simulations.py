@@ -98,7 +98,7 @@ def test_surveys_err_as_predicted_study(name, tmp_path, figure):
     low = 0.75 if name == "lines" else 0.85  # a shape is declared that is rounder than assumed
     assert low - 3 * found.volume_ratio_sd < found.volume_ratio < 1 + 3 * found.volume_ratio_sd
     least, low, high = figures_of(
-        "docs/planning.md",
+        "docs/studies/planning.md",
         "(within the sampling error, at least () % of all), and the median U of the surveys is () "
         "to () of the predicted U",
     )
@@ -170,6 +170,6 @@ def test_surveys_of_walls_that_are_no_model_study(name, tmp_path, figure):
     figure(f"{name}: generated walls, within U", np.round([covered, within.mean()], 3))
     figure(f"{name}: their U over the plan's", np.round(np.median(expanded) / predicted, 2))
     (least,) = figures_of(
-        "docs/planning.md", "do not follow the model of tankcal more than () % are within U"
+        "docs/studies/planning.md", "do not follow the model of tankcal more than () % are within U"
     )
     assert covered > int(least) / 100

@@ -182,12 +182,12 @@ def test_intervals_of_transfers_hold_study(figure, is_density_shared):
     density = "shared density" if is_density_shared else "a density of its own in each gauging"
     figure(f"NSV of {count} transfers held, {density}", f"{share:.4f}")
     full, stated = figures_of(
-        "docs/ticket.md",
+        "docs/studies/ticket.md",
         "Of () simulated transfers, () of the true net standard volumes lie within U (0.95 "
         "expected, standard error 0.002)",
     )
     (own_stated,) = figures_of(
-        "docs/ticket.md", "has an independent error in each gauging, U also holds ():"
+        "docs/studies/ticket.md", "has an independent error in each gauging, U also holds ():"
     )
     assert value_of(full) == count
     assert agree([share], [stated if is_density_shared else own_stated])
