@@ -3,7 +3,6 @@
 import shlex
 from pathlib import Path
 
-from tankcal.errors import InputError, Problem
 from tankcal.messages import message, printable
 from tankcal.terminal.showing import language_of_run, say, speak
 from tankcal.text.shipped import LANGUAGES
@@ -52,29 +51,15 @@ def add(commands):
     new.set_defaults(command=_new)
 
 
-def _refuse_other_survey(kind, survey, language):
-    from tankcal.job.starter.writing import Form
-
-    try:
-        Form(kind, survey, language)
-    except ValueError as error:
-        expected = message(
-            "survey_of_other_kind",
-            "found {survey}; expected another survey: a tank of kind {of_kind} has no such survey",
-            survey=survey,
-            of_kind=kind,
-        )
-        raise InputError(Problem("--survey", expected)) from error
-
-
 def _new(options):
     from tankcal.job.starter import write_input_workbook, write_starter
+    from tankcal.job.starter.writing import refuse_other_survey
 
     if options.language:
         speak(options.language)
     directory, language = Path(options.directory), options.language or language_of_run()
     form = (options.kind, options.survey, language)
-    _refuse_other_survey(*form)
+    refuse_other_survey(*form)
     if not options.workbook:
         write_starter(directory, *form)
         _write_field_sheets(directory, *form)

@@ -85,7 +85,8 @@ class Meaning:
 
 def meanings_of(headings, fields):
     """{heading: Meaning}; a heading and its column must match only each other."""
-    names = {field.name: _names_of(field) for field in fields}
+    labels = [load_words(name)["input"]["labels"] for name in LANGUAGES]
+    names = {field.name: _names_of(field, labels) for field in fields}
     meanings = {}
     for heading in headings:
         if not isinstance(heading, str) or len(heading) > MOST_LETTERS:
@@ -175,11 +176,11 @@ def rename_headings(table, fields, log):
     return tuple(renamed.get(heading, heading) for heading in table.headings), refused
 
 
-def _names_of(field):
-    """Normalised names of a column, without its unit."""
+def _names_of(field, labels):
+    """Normalised names of a column, without its unit; `labels` are those of each language."""
     stem, _ = split_unit(field.name)
-    labels = [load_words(name)["input"]["labels"].get(stem, stem) for name in LANGUAGES]
-    return {_plain(name) for name in (stem, *labels, *USUAL.get(stem, ()))}
+    translated = [known.get(stem, stem) for known in labels]
+    return {_plain(name) for name in (stem, *translated, *USUAL.get(stem, ()))}
 
 
 def _meaning(heading, field, names):

@@ -8,7 +8,7 @@ from conftest import EXAMPLE
 
 import tankcal
 from tankcal.cli import main
-from tankcal.products.workbench.draft import Draft
+from tankcal.products.desk.draft import Draft
 from tankcal.text.delimited import decode_text, find_encoding, read_json
 
 FORMER = """

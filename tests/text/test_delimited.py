@@ -7,7 +7,7 @@ import pytest
 
 from tankcal.job.folder import read_csv
 from tankcal.job.tables import Log
-from tankcal.products.workbench.tables import read_csv_table
+from tankcal.products.desk.tables import read_csv_table
 from tankcal.report.outputs.csv_files import write_rows
 from tankcal.text.delimited import guard_formula, unguard_formula, write_guarded
 

@@ -10,11 +10,11 @@ from job_builder import write_job, write_workbook
 import tankcal
 from tankcal.job.fields import Field
 from tankcal.job.tables import REGISTERS, TABLES
+from tankcal.products.desk.computing import Refusal, Run, Stopped
+from tankcal.products.desk.tables import AmbiguousNumber, text_for_display, text_for_file
 from tankcal.products.workbench import desk
-from tankcal.products.workbench.computing import Refusal, Run, Stopped
 from tankcal.products.workbench.desk import Desk, open_job
-from tankcal.products.workbench.display import warnings_page
-from tankcal.products.workbench.tables import AmbiguousNumber, text_for_display, text_for_file
+from tankcal.products.workbench.pages import warnings_page
 from tankcal.text.shipped import LANGUAGES
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -322,11 +322,13 @@ def test_nothing_is_computed_but_what_is_shown(folder, tmp_path):
 
 
 def test_what_was_done_at_once_is_taken_back_at_once(folder):
-    made, table = live_grid(folder, "points")
+    made, _table = live_grid(folder, "points")
     before = dict(made.draft.tables)
     made.overrule(made.draft.tables["points"].rows[3].cells[0], "leave_out", "a clamp")
     block = [["N1", "6.5", "0", "0.9"], ["N2", "0", "6.5", "0.9"]]
-    table._paste(len(before["points"].rows), 0, block)
+    made.act(
+        "points", {"kind": "paste", "row": len(before["points"].rows), "column": 0, "cells": block}
+    )
     assert made.draft.undo()
     assert made.draft.tables["points"] is before["points"]
     assert "overrulings" in made.draft.tables

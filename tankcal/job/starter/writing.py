@@ -173,6 +173,20 @@ def _refuse_others(value, known):
         raise ValueError(f"found {value!r}; expected one of {', '.join(known)}")
 
 
+def refuse_other_survey(kind, survey, language):
+    """Raise InputError if the kind of tank has no such survey."""
+    try:
+        Form(kind, survey, language)
+    except ValueError as error:
+        expected = message(
+            "survey_of_other_kind",
+            "found {survey}; expected another survey: a tank of kind {of_kind} has no such survey",
+            survey=survey,
+            of_kind=kind,
+        )
+        raise InputError(Problem("--survey", expected)) from error
+
+
 # ---- writing of a starter job to a new folder or a new workbook
 
 

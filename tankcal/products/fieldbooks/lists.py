@@ -195,7 +195,7 @@ def _convert_table(foreign_list, log):
     kinds = [fields[meaning.column].kind for _, meaning in used]
     rows = tuple(
         tuple(
-            _convert_cell(cell, meaning.factor, decimal) if kind == "number" else cell
+            convert_cell(cell, meaning.factor, decimal) if kind == "number" else cell
             for cell, kind, (_, meaning) in zip(row, kinds, used, strict=True)
         )
         for row in rows
@@ -204,7 +204,7 @@ def _convert_table(foreign_list, log):
                  table.skipped)  # fmt: skip
 
 
-def _convert_cell(cell, factor, decimal):
+def convert_cell(cell, factor, decimal):
     """Return a number with a decimal point in the unit of its column; other texts are unchanged."""
     if is_blank(cell):
         return cell

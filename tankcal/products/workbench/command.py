@@ -68,7 +68,7 @@ def _port(text):
 
 def _write_notebook(options, out):
     """Return the path of the notebook of a job, after writing it or keeping manual changes."""
-    from tankcal.products.workbench.draft import Draft, source_of
+    from tankcal.products.desk.draft import Draft, source_of
     from tankcal.products.workbench.serving import notebook_path, write_notebook
     from tankcal.terminal.input_language import read_job_language
 

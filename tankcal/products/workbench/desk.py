@@ -7,20 +7,19 @@ Without widgets, the same actions are function calls:
     desk.problems, desk.save(), desk.run()
 """
 
-import datetime
 import os
 from importlib.util import find_spec
 from pathlib import Path
 
 from tankcal.errors import InputError, TankcalError, reason_of
-from tankcal.job.contract import SURVEYS, TABLES_OF_KIND
 from tankcal.job.tables import REGISTERS, TABLES
-from tankcal.products.workbench.computing import Refusal, Run
-from tankcal.products.workbench.display import Reader, list_page, table_page, text_page
-from tankcal.products.workbench.draft import Draft
-from tankcal.products.workbench.findings import BAD, DOUBTFUL
-from tankcal.products.workbench.keys import SETTINGS, field_of
-from tankcal.products.workbench.tables import text_for_file
+from tankcal.products.desk.computing import Refusal
+from tankcal.products.desk.desk import Desk
+from tankcal.products.desk.display import Reader
+from tankcal.products.desk.draft import Draft
+from tankcal.products.desk.findings import BAD, DOUBTFUL
+from tankcal.products.desk.keys import SETTINGS
+from tankcal.products.workbench.pages import list_page, table_page, text_page
 from tankcal.report.folders import default_folder
 from tankcal.text.shipped import DEFAULT, nearest_language
 
@@ -51,7 +50,7 @@ def open_job(job=".", *, out=None, language=None, live=None):
 
     Returns
     -------
-    Desk
+    NotebookDesk
 
     Raises
     ------
@@ -75,56 +74,24 @@ def open_job(job=".", *, out=None, language=None, live=None):
     language = supported or nearest_language(draft.value("table", "language")) or DEFAULT
     out = Path(out) if out is not None else default_folder(draft.source)
     is_live = is_attended() if live is None else bool(live)
-    return Desk(draft, out, Reader(language), is_live)
+    return NotebookDesk(draft, out, Reader(language), is_live)
 
 
-class Desk:
+class NotebookDesk(Desk):
     """A job in a notebook; its tables are attributes, such as `desk.points` or `desk.cameras`.
 
     Attributes
     ----------
-    draft : Draft
-        Edited files of the job.
-    reader : Reader
-        Texts in the language.
-    out : Path
-        Folder of the results.
     is_live : bool
         Whether grids and buttons are shown.
-    last_run : Run or None
-        Last computation.
-    is_stale : bool
-        Whether the job was edited or overruled since the last computation.
-    status : str
-        Message about the last action, shown in the head.
+    pending_check : asyncio.TimerHandle or None
+        Check that follows the last edit after a pause.
     """
 
     def __init__(self, draft, out, reader, is_live):
-        self.draft, self.out, self.reader = draft, out, reader
+        super().__init__(draft, out, reader)
         self.is_live = is_live and all(map(find_spec, WIDGETS))
-        self.last_run, self.is_stale = None, False
-        self.every_key, self.status, self.pending_check = {}, "", None
-        self._listeners, self._check = [], None
-
-    # ---- content
-
-    @property
-    def names(self):
-        """Names of the tables of the job, in the order of the contract."""
-        return tuple(name for name in TABLES if name in self.draft.tables)
-
-    @property
-    def lists(self):
-        """Names of the lists of the job: cameras, instruments, clouds, meters."""
-        return tuple(name for name in REGISTERS if name in self.draft.keys)
-
-    @property
-    def addable(self):
-        """Names of the tables that can be added to the job."""
-        kind = self.draft.kind or "vertical"
-        of_surveys = [name for names in SURVEYS.values() for name in names]
-        may = [*TABLES_OF_KIND[kind], *(of_surveys if kind == "vertical" else ())]
-        return tuple(name for name in TABLES if name in may and name not in self.draft.tables)
+        self.pending_check = None
 
     def __getattr__(self, name):
         if not name.startswith("_") and (name in TABLES or name in REGISTERS):
@@ -143,110 +110,10 @@ class Desk:
         """View of job.toml, or of the sheet of settings."""
         return TableView(self, SETTINGS)
 
-    def show(self, name):
-        """`ShownTable` of a table, of a list or of the settings ("job")."""
-        return self.reader.show(self.draft, self.outcome, name, self.every_key.get(name, False))
-
-    # ---- checks
-
-    @property
-    def outcome(self):
-        """`Check` of the edited job."""
-        if self._check is None:
-            self._check = self.draft.check()
-        return self._check
-
     @property
     def problems(self):
         """Problems and warnings of the job, as a list that a notebook can show."""
         return Findings(self)
-
-    def listen(self, act):
-        """Register a function act() that is called after each change."""
-        self._listeners.append(act)
-
-    def notify_edit(self):
-        """Discard the check after an edit, and notify the listeners."""
-        self.mark_edited()
-        self.notify()
-
-    def mark_edited(self):
-        """Discard the check after an edit, and mark the results as outdated."""
-        self._check, self.status = None, ""
-        self.is_stale = self.last_run is not None
-
-    def notify(self):
-        """Notify the listeners."""
-        for act in tuple(self._listeners):
-            act()
-
-    # ---- edits
-
-    def enter(self, name, row, column, text):
-        """Enter a text in a cell, with the decimal mark of the language.
-
-        Parameters
-        ----------
-        name : str
-            Name of a table ("points"), of a list, or "job".
-        row : int or str
-            Row from 0; for "job" and lists, the owner of a key.
-        column : str
-            Column; for "job" and lists, the key.
-        text : str
-            Entered text.
-        """
-        if isinstance(row, str):
-            typed = text_for_file(field_of(name, row, column), text, ".", self.reader.mark)
-            self.draft.set_value(name, row, column, typed)
-        else:
-            self.reader.enter(self.draft, name, [(row, column, text)])
-        self.notify_edit()
-
-    def save(self):
-        """Write the edited files of the job, all or none of them, and return their paths."""
-        try:
-            written = self.draft.save()
-        except InputError as error:
-            raise self.refusal(error) from None
-        except OSError as error:
-            reason = self.reader.say(reason_of(error))
-            raise Refusal(self.reader.word("not_saved", reason=reason)) from None
-        self._check = None
-        self.notify()
-        return written
-
-    def refusal(self, error):
-        """`Refusal` with an error of tankcal in the language."""
-        return Refusal("\n".join(self.reader.say(text) for text in error.texts))
-
-    # ---- computing
-
-    def prepare_run(self, on_progress=None, papers=True, on_result=None):
-        """Save the job, and return a `Run` that is not yet started.
-
-        Parameters
-        ----------
-        on_progress, papers, on_result
-            As in `Run`.
-
-        Returns
-        -------
-        Run
-
-        Raises
-        ------
-        Refusal
-            If the job cannot be computed or saved.
-        """
-        if not self.outcome.is_valid:
-            raise Refusal("\n".join(self.reader.line(problem) for problem in self.outcome.problems))
-        try:
-            self.draft.refuse_changed_elsewhere()  # so that the shown job is computed
-        except InputError as error:
-            raise self.refusal(error) from None
-        self.save()
-        return Run(self.draft.source, self.out, on_progress, papers, on_result)
 
     def run(self, papers=True):
         """Save the job, compute it and write the results as `tankcal run`; return the result.
@@ -267,10 +134,6 @@ class Desk:
         self.keep_run(run)
         return run.result
 
-    def keep_run(self, run):
-        """Store a `Run` as the last computation."""
-        self.last_run, self.is_stale = run, False
-
     @property
     def results(self):
         """Run button, progress and results for a notebook.
@@ -281,36 +144,6 @@ class Desk:
             self.run()
         return Results(self)
 
-    def overrule(self, point, decision, reason):
-        """Enter the user's decision about a rejected point in the table of overrulings.
-
-        Parameters
-        ----------
-        point : str
-            Name of the point.
-        decision : {"keep", "leave_out"}
-            Decision.
-        reason : str
-            Reason of the decision.
-        """
-        draft, name = self.draft, "overrulings"
-        columns = ("point", "decision", "reason", "date")
-        given = {"point": point, "decision": decision, "reason": reason}
-        given["date"] = datetime.date.today().isoformat()
-        with draft.group_edits():
-            if name not in draft.tables:
-                draft.add_table(name, columns)
-            for column in columns:
-                draft.add_column(name, column)
-            table = draft.tables[name]
-            column = table.headings.index("point")
-            points = [row.cells[column] for row in table.rows]
-            row = points.index(point) if point in points else len(points)
-            if row == len(points):
-                draft.insert_rows(name, row)
-            draft.set_cells(name, [(row, *entry) for entry in given.items()])
-        self.notify_edit()
-
     @property
     def more(self):
         """Selection of a table to add to the job."""
@@ -318,16 +151,6 @@ class Desk:
 
     def _repr_mimebundle_(self, include=None, exclude=None):
         return bundle(self, "head_panel", text_page(self.head_text()))
-
-    def head_text(self):
-        """Path of the job and numbers of its problems and warnings, in a few lines."""
-        problems, warnings = len(self.outcome.problems), len(self.outcome.warnings)
-        word = self.reader.word
-        lines = [word("job_is", job=str(self.draft.source.resolve()))]
-        lines.append(word("counts", problems=problems, warnings=warnings))
-        if self.draft.locked is not None:
-            lines.append(self.reader.say(self.draft.locked))
-        return "\n".join(lines)
 
 
 def bundle(desk, panel, page, *arguments):
@@ -428,7 +251,7 @@ class Results:
         self._desk = desk
 
     def _repr_mimebundle_(self, include=None, exclude=None):
-        from tankcal.products.workbench.display import results_page
+        from tankcal.products.workbench.pages import results_page
 
         desk = self._desk
         return bundle(desk, "results_panel", "" if desk.is_live else results_page(desk))

@@ -6,9 +6,9 @@ from html import escape
 import ipywidgets as widgets
 
 from tankcal.errors import InputError, TankcalError, reason_of
-from tankcal.products.workbench.computing import Refusal
-from tankcal.products.workbench.display import warnings_page
+from tankcal.products.desk.computing import Refusal
 from tankcal.products.workbench.grid import Grid
+from tankcal.products.workbench.pages import warnings_page
 from tankcal.record import record_of
 
 PAUSE_S = 0.3  # pause after an edit before the job is checked
@@ -94,66 +94,18 @@ class TableGrid:
                 setattr(grid, key, value)
 
     def _handle_message(self, _widget, content, _buffers):
-        """Handle a message of the grid, whose kind is the name of a method below."""
+        """Handle a message of the grid: an action of the desk."""
         desk = self.desk
         try:
-            getattr(self, f"_{content['kind']}")(
-                **{k: v for k, v in content.items() if k != "kind"}
-            )
+            desk.act(self.name, content)
         except InputError as error:  # a locked workbook, or a key that cannot be edited here
             show_status(desk, "\n".join(desk.reader.say(text) for text in error.texts))
             self.refresh()
             return
-        if content["kind"] == "every":
+        if content["kind"] not in ("enter", "paste"):
             self.refresh()
-            return
-        desk.mark_edited()
-        check_later(desk)
-
-    def _enter(self, changes):
-        """Enter texts in cells."""
-        desk = self.desk
-        with desk.draft.group_edits():
-            desk.reader.enter(desk.draft, self.name, changes, desk.every_key.get(self.name, False))
-
-    def _paste(self, row, column, cells):
-        """Paste a block of cells, with new rows below the table if required."""
-        draft, shown = self.desk.draft, self.grid.columns
-        changes = [
-            (row + down, shown[column + right]["name"], text)
-            for down, line in enumerate(cells)
-            for right, text in enumerate(line)
-            if column + right < len(shown)
-        ]
-        with draft.group_edits():
-            if self.name in draft.tables:
-                count = len(draft.tables[self.name].rows)
-                if row + len(cells) > count:
-                    draft.insert_rows(self.name, count, row + len(cells) - count)
-            self._enter(changes)
-
-    def _insert(self, row, count):
-        """Insert blank rows."""
-        self.desk.draft.insert_rows(self.name, row, count)
-        self.refresh()
-
-    def _remove(self, rows):
-        """Remove rows."""
-        self.desk.draft.remove_rows(self.name, rows)
-        self.refresh()
-
-    def _column(self, name):
-        """Add a column."""
-        self.desk.draft.add_column(self.name, name)
-        self.refresh()
-
-    def _every(self, value):
-        """Show all keys, or only given and required keys."""
-        self.desk.every_key[self.name] = bool(value)
-
-    def _undo(self):
-        """Revert the last edit."""
-        self.desk.draft.undo()
+        if content["kind"] != "every":
+            check_later(desk)
 
 
 def show_status(desk, text):

@@ -16,11 +16,11 @@ import traitlets
 from tankcal.errors import InputError, TankcalError
 from tankcal.job.contract.overrulings import DECISIONS
 from tankcal.job.starter.texts import split_unit
+from tankcal.products.desk.tables import NUMBER
 from tankcal.products.quantity.reading import GAUGING, GLASS, PRODUCT, SHELL, read_tickets
 from tankcal.products.quantity.saving import ticket_file
 from tankcal.products.quantity.table import table_of
 from tankcal.products.quantity.transfer import STATES
-from tankcal.products.workbench.tables import NUMBER
 from tankcal.products.workbench.views.page import Calculator, frame_html, table_page, wall_page
 from tankcal.products.workbench.views.what_if import BudgetPanel
 from tankcal.record.schema import to_plain

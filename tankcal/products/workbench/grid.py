@@ -1,11 +1,13 @@
-"""Grid: a table of a job as a widget of JupyterLab and Voilà (anywidget)."""
+"""Grid: a table of a job as a widget of JupyterLab (anywidget)."""
 
 from pathlib import Path
 
 import anywidget
 import traitlets
 
-HERE = Path(__file__).parent
+import tankcal.products.desk
+
+FOLDER = Path(tankcal.products.desk.__file__).parent
 
 
 class Grid(anywidget.AnyWidget):
@@ -15,8 +17,8 @@ class Grid(anywidget.AnyWidget):
     the current rows.
     """
 
-    _esm = HERE / "grid.js"
-    _css = HERE / "grid.css"
+    _esm = FOLDER / "grid.js"
+    _css = FOLDER / "grid.css"
     name = traitlets.Unicode().tag(sync=True)
     label = traitlets.Unicode().tag(sync=True)
     columns = traitlets.List().tag(sync=True)

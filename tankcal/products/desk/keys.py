@@ -22,7 +22,7 @@ from tankcal.job.fields import Field
 from tankcal.job.folder import flatten_entry
 from tankcal.job.sheets import KEY, SECTION, VALUE, is_read
 from tankcal.job.tables import REGISTERS, SETTINGS_SHEET, TABLES
-from tankcal.products.workbench.tables import AmbiguousNumber, EditedTable, Row
+from tankcal.products.desk.tables import AmbiguousNumber, EditedTable, Row
 from tankcal.text.naming import NUMBER
 
 SETTINGS = "job"  # name of the settings

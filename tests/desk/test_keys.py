@@ -7,8 +7,8 @@ import pytest
 import tomlkit
 
 from tankcal.job.fields import Field
-from tankcal.products.workbench.keys import EditedKeys, Entry, toml_value
-from tankcal.products.workbench.tables import AmbiguousNumber
+from tankcal.products.desk.keys import EditedKeys, Entry, toml_value
+from tankcal.products.desk.tables import AmbiguousNumber
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SETTINGS = (EXAMPLES / "silva-1995" / "job.toml").read_text(encoding="utf-8")

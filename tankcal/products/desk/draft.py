@@ -10,10 +10,13 @@ import hashlib
 import os
 import tempfile
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.job.contract import COLUMNS, KINDS, columns_of
+from tankcal.job.field_values import read_value
+from tankcal.job.fields import Refused
 from tankcal.job.folder import csv_marks, decode, parsed_toml, read_toml, results_given_as_job
 from tankcal.job.loading import load_edited
 from tankcal.job.tables import (
@@ -27,16 +30,17 @@ from tankcal.job.tables import (
     read_bytes,
 )
 from tankcal.messages import message
-from tankcal.products.workbench.findings import Check, mark_cells
-from tankcal.products.workbench.keys import (
+from tankcal.products.desk.findings import BAD, Check, Mark, mark_cells
+from tankcal.products.desk.keys import (
     READ_ONLY_SECTIONS,
     SETTINGS,
     EditedKeys,
+    field_of,
     new_sheet_table,
     read_book,
     write_book,
 )
-from tankcal.products.workbench.tables import new_csv_table, read_csv_table
+from tankcal.products.desk.tables import AmbiguousNumber, new_csv_table, read_csv_table
 from tankcal.text.delimited import WESTERN, decode_text, find_encoding, is_western
 
 AMBIGUOUS = message(
@@ -51,6 +55,9 @@ FORMULAS = message(
     "would be lost here",
 )
 MOST_UNDO = 200  # number of edits that Undo can revert
+OPERATIONS = (
+    *("set_cells", "insert_rows", "remove_rows", "add_column", "add_table", "set_value", "restore"),
+)
 
 
 def source_of(path):
@@ -73,6 +80,18 @@ def source_of(path):
     raise InputError(Problem(path.name or str(path), results_given_as_job(path) or no_job))
 
 
+@dataclass(frozen=True)
+class Step:
+    """State of a job beside an edit, with the operations of this edit.
+
+    An operation is the name of a method of `Draft` with its arguments.
+    """
+
+    operations: list
+    tables: dict
+    keys: dict
+
+
 class Draft:
     """State of the files of a job, with previous states for Undo.
 
@@ -88,6 +107,10 @@ class Draft:
         Reason why the job cannot be edited.
     unreadable : list of Problem
         Problems of files of keys that cannot be read, and therefore cannot be edited here.
+    revision : int
+        Number of edits since the job was opened; Undo and Redo are edits.
+    on_edit : callable
+        Function on_edit(operations) that is called after each edit.
     """
 
     def __init__(self, source):
@@ -97,7 +120,10 @@ class Draft:
         self.unreadable = []
         self._saved_bytes = {}  # {file: its bytes, None for a missing file}
         self._saved = {}  # {name of a table or of keys: its state on the disk}
-        self._undo_states, self._marks = [], (",", ".")
+        self._undo_steps, self._redo_steps, self._group = [], [], None
+        self._revisions, self.revision = {}, 0  # {revision: (tables, keys)} before later edits
+        self.on_edit = lambda operations: None
+        self._marks = ",", "."
         self.tables, self.keys = {}, {}
         if self.is_book:
             self._read_book()
@@ -215,37 +241,38 @@ class Draft:
             for row, heading, text in changes
             if 0 <= row < len(table.rows) and heading in table.headings
         ]
-        self._store_undo()
-        self.tables[name] = table.set_cells(places)
+        changes = [(row, table.headings[column], text) for row, column, text in places]
+        self._commit(("set_cells", name, changes), tables={name: table.set_cells(places)})
 
     def insert_rows(self, name, place, count=1):
         """Insert blank rows before row `place`."""
-        self._store_undo()
-        self.tables[name] = self.tables[name].insert_rows(place, count)
+        state = self.tables[name].insert_rows(place, count)
+        self._commit(("insert_rows", name, place, count), tables={name: state})
 
     def remove_rows(self, name, places):
         """Remove rows."""
-        self._store_undo()
-        self.tables[name] = self.tables[name].remove_rows(places)
+        state = self.tables[name].remove_rows(places)
+        self._commit(("remove_rows", name, sorted(places)), tables={name: state})
 
     def add_column(self, name, heading):
         """Add a blank column at the right, unless it exists."""
         if heading not in self.tables[name].headings:
-            self._store_undo()
-            self.tables[name] = self.tables[name].add_column(heading)
+            state = self.tables[name].add_column(heading)
+            self._commit(("add_column", name, heading), tables={name: state})
 
     def add_table(self, name, headings=None):
         """Add a table without rows; by default with the required columns."""
         required = [
             field.name for field in COLUMNS[name] if field.suits(self.kind) and field.required
         ]
-        required = headings or required or [field.name for field in columns_of(name, self.kind)]
-        self._store_undo()
+        headings = headings or required or [field.name for field in columns_of(name, self.kind)]
         if self.is_book:
-            self.tables[name] = new_sheet_table(name, required, self.kind)
-            return
-        self._saved_bytes.setdefault(f"{name}.csv", None)
-        self.tables[name] = new_csv_table(name, f"{name}.csv", required, *self._marks)
+            state = new_sheet_table(name, headings, self.kind)
+        else:
+            state = new_csv_table(name, f"{name}.csv", headings, *self._marks)
+        self._commit(("add_table", name, list(headings)), tables={name: state})
+        if not self.is_book:
+            self._saved_bytes.setdefault(f"{name}.csv", None)
 
     def set_value(self, name, owner, key, text):
         """Set the value of a key of the settings or of a list.
@@ -273,8 +300,24 @@ class Draft:
             state = keys.set_value(owner, key, text)
         except (TOMLKitError, ValueError, LookupError, TypeError, AttributeError):
             self._refuse_edit(keys, owner, key)
-        self._store_undo()
-        self.keys[name] = state
+        self._commit(("set_value", name, owner, key, text), keys={name: state})
+
+    def restore(self, files):
+        """Replace tables and lists by their content, {name: text or None}; None removes a table.
+
+        The journal repeats Undo and Redo by this edit, because it does not contain the states
+        before its beginning.
+        """
+        tables, keys = dict(self.tables), dict(self.keys)
+        for name, text in files.items():
+            if text is None:
+                tables.pop(name, None)
+            elif name in keys:
+                keys[name] = replace(keys[name], text=text, ambiguous={})
+            else:
+                tables[name] = read_csv_table(name, f"{name}.csv", text, *self._marks)
+                self._saved_bytes.setdefault(f"{name}.csv", None)
+        self._commit(("restore", files), replaced=(tables, keys))
 
     @staticmethod
     def _refuse_edit(keys, owner, key):
@@ -282,31 +325,145 @@ class Draft:
         expected = message("key_not_edited_here", "cannot be edited here; edit the file itself")
         raise InputError(Problem(keys.file, expected, None, f"{owner}.{key}"))
 
-    def _store_undo(self):
-        """Store the state for Undo before an edit; InputError if the job is locked."""
+    def _commit(self, operation, tables=(), keys=(), replaced=None):
+        """Make an edit the present state; InputError if the job is locked."""
         if self.locked is not None:
             raise InputError(Problem(self.source.name, self.locked))
-        self._undo_states.append((dict(self.tables), dict(self.keys)))
-        del self._undo_states[:-MOST_UNDO]
+        before = self.tables, self.keys
+        self.tables, self.keys = replaced or (
+            {**self.tables, **dict(tables)},
+            {**self.keys, **dict(keys)},
+        )
+        if self._group is None:
+            self._finish_edit([operation], before)
+        else:
+            self._group.append(operation)
+
+    def _finish_edit(self, operations, before):
+        """Store the state before an edit for Undo, and report the edit."""
+        self._undo_steps.append(Step(operations, *before))
+        del self._undo_steps[:-MOST_UNDO]
+        self._redo_steps.clear()
+        self._count_revision(*before)
+        self.on_edit(operations)
+
+    def _count_revision(self, *before):
+        """Count a new revision, and keep the state before it for `changes_since`."""
+        self._revisions[self.revision] = before
+        self._revisions.pop(self.revision - MOST_UNDO, None)
+        self.revision += 1
 
     @contextmanager
     def group_edits(self):
         """Context in which all edits are a single edit for Undo, and are discarded on an error."""
-        state, before = (dict(self.tables), dict(self.keys)), [*self._undo_states]
+        if self._group is not None:  # a part of a larger edit
+            yield
+            return
+        before, self._group = (self.tables, self.keys), []
         try:
             yield
         except BaseException:
-            (self.tables, self.keys), self._undo_states = state, before
+            self.tables, self.keys = before
             raise
-        if self._undo_states and (not before or self._undo_states[-1] is not before[-1]):
-            self._undo_states = [*before, state][-MOST_UNDO:]
+        else:
+            operations, self._group = self._group, None
+            if operations:
+                self._finish_edit(operations, before)
+        finally:
+            self._group = None
 
     def undo(self):
         """Revert the last edit, and return whether there was an edit."""
-        if not self._undo_states:
+        return self._step(self._undo_steps, self._redo_steps)
+
+    def redo(self):
+        """Repeat the last reverted edit, and return whether there was an edit."""
+        return self._step(self._redo_steps, self._undo_steps)
+
+    def _step(self, steps, opposite):
+        """Exchange the present state with the last state of `steps`."""
+        if not steps:
             return False
-        self.tables, self.keys = self._undo_states.pop()
+        step, before = steps.pop(), (self.tables, self.keys)
+        opposite.append(Step(step.operations, *before))
+        self.tables, self.keys = step.tables, step.keys
+        self._count_revision(*before)
+        is_undo = steps is self._undo_steps
+        self.on_edit([("undo" if is_undo else "redo",)] if self.is_book else self._difference())
         return True
+
+    def _difference(self):
+        """Operations that repeat the last exchange of states: changed files, ambiguous texts."""
+        tables, keys = self._revisions[self.revision - 1]
+        old, now = {**tables, **keys}, {**self.tables, **self.keys}
+        changed = [name for name in {**old, **now} if old.get(name) is not now.get(name)]
+        files = {
+            name: now[name].render()[0].decode("utf-8") if name in now else None for name in changed
+        }
+        operations = [("restore", files)]
+        for name in changed:
+            if name in self.tables:
+                table, numbers = self.tables[name], self.tables[name].render()[1]
+                written = [row for row, number in enumerate(numbers) if number is not None]
+                texts = [
+                    (written.index(row), table.headings[column], table.rows[row].cells[column])
+                    for row, column in table.ambiguous
+                    if row in written
+                ]
+                operations += [("set_cells", name, texts)] if texts else []
+            elif name in self.keys:
+                operations += [
+                    ("set_value", name, *place, text)
+                    for place, text in self.keys[name].ambiguous.items()
+                ]
+        return operations
+
+    def apply(self, operations):
+        """Repeat an edit from its operations, as `on_edit` reported them."""
+        if operations in ([("undo",)], [("redo",)]):
+            getattr(self, operations[0][0])()
+            return
+        with self.group_edits():
+            for method, *arguments in operations:
+                if method not in OPERATIONS:
+                    raise ValueError(f"found the operation {method!r}")
+                getattr(self, method)(*arguments)
+
+    @property
+    def undo_operations(self):
+        """Operations of the edit that Undo would revert; [] if there is no such edit."""
+        return self._undo_steps[-1].operations if self._undo_steps else []
+
+    @property
+    def redo_operations(self):
+        """Operations of the edit that Redo would repeat; [] if there is no such edit."""
+        return self._redo_steps[-1].operations if self._redo_steps else []
+
+    def changes_since(self, revision):
+        """Determine what differs from an earlier revision.
+
+        Parameters
+        ----------
+        revision : int
+            Earlier value of `revision`.
+
+        Returns
+        -------
+        dict or None
+            {name of a table or of keys: [(row, heading)] or None}; None denotes a change of rows,
+            columns or keys. None as a whole: the earlier revision is no longer known.
+        """
+        if revision == self.revision:
+            return {}
+        if revision not in self._revisions:
+            return None
+        tables, keys = self._revisions[revision]
+        old, now = {**tables, **keys}, {**self.tables, **self.keys}
+        return {
+            name: _list_changed_cells(old.get(name), now.get(name))
+            for name in {**old, **now}
+            if old.get(name) is not now.get(name)
+        }
 
     # ---- files
 
@@ -327,6 +484,48 @@ class Draft:
         return {
             name: data for name, data in files.items() if data != self._saved_bytes[name]
         }, numbers
+
+    def quick_check(self, name, places):
+        """Check the text of cells by their fields, without the rest of the job.
+
+        Parameters
+        ----------
+        name : str
+            Name of a table, of a list or of the settings.
+        places : list of (int or str, str)
+            Row and heading of each cell; for keys, owner and key.
+
+        Returns
+        -------
+        dict
+            {(row, heading): Mark} of the cells whose text is not accepted.
+        """
+        marks = {}
+        for row, column in places:
+            problem = self._problem_of_cell(name, row, column)
+            if problem is not None:
+                marks[row, column] = Mark(BAD, problem)
+        return marks
+
+    def _problem_of_cell(self, name, row, column):
+        """Problem of a filled cell that its field does not accept, or None."""
+        if name in self.keys:
+            file, field = self.keys[name].file, field_of(name, row, column)
+            entries = {(entry.owner, entry.key): entry.text for entry in self.keys[name].entries}
+            raw, decimal = entries.get((row, column), ""), "."
+        else:
+            table = self.tables[name]
+            file, field, decimal = table.file, self.fields(name).get(column), table.decimal
+            raw = table.rows[row].cells[table.headings.index(column)]
+        if isinstance(raw, AmbiguousNumber):
+            return Problem(file, AMBIGUOUS, None, column)
+        if field is None or not raw.strip():
+            return None
+        try:
+            read_value(field, raw, decimal)
+        except Refused as refusal:
+            return Problem(file, refusal.text, None, column)
+        return None
 
     def check(self):
         """Check the job in its edited state, and return a `Check` with all problems by cell."""
@@ -394,7 +593,8 @@ class Draft:
         self._saved_bytes.update(files)
         if self.is_book and files:
             self._read_book()
-            self._undo_states.clear()
+            self._undo_steps.clear()
+            self._redo_steps.clear()
         self._saved = {**self.tables, **self.keys}
         return [folder / name for name in files]
 
@@ -406,6 +606,10 @@ class Draft:
     def _paths(self, names):
         """Absolute paths of files, {name: path}."""
         return {name: (self._folder / name).resolve() for name in names}
+
+    def digests(self):
+        """SHA-256 of the files as they were read or saved, {file: digest or None}."""
+        return {name: _digest(data) for name, data in self._saved_bytes.items()}
 
     def refuse_changed_elsewhere(self, names=None):
         """Raise InputError if another program has changed one of these files, or any file."""
@@ -421,6 +625,21 @@ class Draft:
                 changed.append(Problem(name, expected))
         if changed:
             raise InputError(changed)
+
+
+def _list_changed_cells(old, now):
+    """Changed cells [(row, heading)] of two states of a table; None if their forms differ."""
+    if old is None or now is None or not hasattr(now, "rows") or not hasattr(now, "headings"):
+        return None
+    if old.headings != now.headings or len(old.rows) != len(now.rows):
+        return None
+    return [
+        (place, heading)
+        for place, (before, row) in enumerate(zip(old.rows, now.rows, strict=True))
+        if before is not row  # states share the rows that no edit has changed
+        for heading, text, other in zip(now.headings, row.cells, before.cells, strict=True)
+        if text != other
+    ]
 
 
 def _decode_with_mark(file, data):

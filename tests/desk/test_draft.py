@@ -11,10 +11,10 @@ from openpyxl import load_workbook
 
 import tankcal
 from tankcal.errors import InputError
-from tankcal.products.workbench import draft as drafts
-from tankcal.products.workbench.draft import Draft
-from tankcal.products.workbench.findings import BAD, DOUBTFUL
-from tankcal.products.workbench.tables import AmbiguousNumber
+from tankcal.products.desk import draft as drafts
+from tankcal.products.desk.draft import Draft
+from tankcal.products.desk.findings import BAD, DOUBTFUL
+from tankcal.products.desk.tables import AmbiguousNumber
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 FOLDERS = sorted(path.parent.name for path in EXAMPLES.glob("*/job.toml"))

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from tankcal.job.folder import read_csv
 from tankcal.job.tables import Log
-from tankcal.products.workbench.tables import AmbiguousNumber, new_csv_table, read_csv_table
+from tankcal.products.desk.tables import AmbiguousNumber, new_csv_table, read_csv_table
 
 TEXT = (
     "\ufeff# of the crew; kept\r\n"

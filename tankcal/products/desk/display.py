@@ -1,32 +1,22 @@
 """Display of a table of a draft: headings, notes, texts and marks in the reader's language."""
 
 from dataclasses import dataclass
-from html import escape
 
 from tankcal.errors import SHEET
 from tankcal.job.contract import KEYS, REGISTER_KEYS, SECTIONS
 from tankcal.job.starter.texts import Texts, split_unit, texts_in
-from tankcal.products.workbench.findings import BAD, DOUBTFUL
-from tankcal.products.workbench.keys import READ_ONLY_SECTIONS, SETTINGS, field_of
-from tankcal.products.workbench.tables import text_for_display, text_for_file
+from tankcal.products.desk.findings import BAD
+from tankcal.products.desk.keys import READ_ONLY_SECTIONS, SETTINGS, field_of
+from tankcal.products.desk.tables import text_for_display, text_for_file
 from tankcal.text.words import marks_of, say
 
 # Names of the columns in which keys are shown.
-OWNER, KEY, VALUE, UNIT, EXPECTED = "owner", "key", "value", "unit", "expected"
+KEY_COLUMNS = OWNER, KEY, VALUE, UNIT, EXPECTED = "owner", "key", "value", "unit", "expected"
+STEPS = (  # methods of a draft, and the keys of the names of their edits
+    *(("restore", "restore"), ("add_table", "add_table"), ("add_column", "column")),
+    *(("insert_rows", "insert"), ("remove_rows", "remove")),
+)
 MOST_CHOICES = 12  # largest number of choices that are translated; longer lists are codes
-MOST_ROWS = 400  # largest number of rows of a page; the middle of a longer table is omitted
-STYLE = """<style>
-.tankcal-plain { border-collapse: collapse; font-size: 13px; }
-.tankcal-plain th, .tankcal-plain td { border: 1px solid #bbb; padding: 2px 6px; text-align: left; }
-.tankcal-plain th small { display: block; font-weight: normal; }
-.tankcal-plain td.number { text-align: right; font-variant-numeric: tabular-nums; }
-.tankcal-plain .bad { background: #f7c6c5; color: #5c0a09; }
-.tankcal-plain .doubtful { background: #fbe6b4; color: #4d3800; }
-.tankcal-plain td.bad small, .tankcal-plain td.doubtful small, .tankcal-plain .reason {
-  display: block; white-space: pre-line; }
-ul.tankcal-list { padding-left: 1.2em; }
-ul.tankcal-list li.bad { color: #8c1d18; } ul.tankcal-list li.doubtful { color: #6b4e00; }
-</style>"""
 
 
 @dataclass(frozen=True)
@@ -105,6 +95,48 @@ class Reader:
         notes = self.texts.notes
         note = notes["tables"].get(name) or notes["registers"].get(name)
         return note or self.word("settings_note")
+
+    # ---- forms, and names of edits
+
+    def label(self, section, field):
+        """Short label of a setting."""
+        labels, stem = self.words["desk"]["labels"], split_unit(field.name)[0]
+        named = self.words["input"]["labels"].get(stem, field.name)
+        return labels.get(f"{section}.{field.name}", named)
+
+    def help(self, name, owner, field):
+        """Description of a key with its accepted values."""
+        return self._unit_and_note(name, owner, field.name, field)[1]
+
+    def choice(self, field, code):
+        """Text of a choice of a setting, in the words of the form."""
+        named = self.words["kinds"] if field.name == "kind" else {}
+        return named.get(code) or self.texts.choice(code)
+
+    def marks_of_keys(self, check, name):
+        """Level and text of the problem of each key, {(owner, key): (level, text)}."""
+        return self._marks(check, name, lambda place: place)
+
+    def step(self, operations):
+        """Name of an edit for Undo and Redo; "" without operations."""
+        if not operations:
+            return ""
+        counts = dict.fromkeys(("cells", "rows"), 0)
+        for method, *arguments in operations:
+            counts["cells"] += len(arguments[1]) if method == "set_cells" else 0
+            counts["cells"] += method == "set_value"
+            counts["rows"] += arguments[2] if method == "insert_rows" else 0
+            counts["rows"] += len(arguments[1]) if method == "remove_rows" else 0
+        methods = {method for method, *_ in operations}
+        code = next((code for method, code in STEPS if method in methods), "cell")
+        if code == "insert" and counts["cells"]:
+            code = "paste"
+        if code == "cell" and counts["cells"] > 1:
+            code = "cells"
+        name = operations[0][1]
+        table = self.title(name) if isinstance(name, str) else ""
+        count = counts["cells"] if code == "cells" else counts["rows"]
+        return self.words["desk"]["steps"][code].format(table=table, count=count)
 
     # ---- showing
 
@@ -317,102 +349,3 @@ def key_places(draft, name, every_key=False):
 def _plain_file(file):
     """Name of a file, or of a sheet without its prefix."""
     return str(file).removeprefix(SHEET)
-
-
-# ---- tables, lists and results as plain HTML, with the texts and colours of the widgets
-
-
-def table_page(shown, left_out):
-    """HTML of a ShownTable, with the problem in each marked cell.
-
-    `left_out(count)` returns the text of the row that replaces omitted rows.
-    """
-    head = "".join(
-        f"<th{_class_of(shown.marks, None, place)}>{escape(column.heading)}"
-        f"<small>{escape(column.name if shown.takes_rows else column.unit)}</small>"
-        f"{_reason(shown.marks, None, place)}</th>"
-        for place, column in enumerate(shown.columns)
-    )
-    half = MOST_ROWS // 2
-    cut = len(shown.rows) > MOST_ROWS
-    marked = {row for row, _ in shown.marks if row is not None}
-    body = []
-    for row in range(len(shown.rows)):
-        if not cut or row < half or row >= len(shown.rows) - half or row in marked:
-            body.append(_row(shown, row))
-        elif row == half:
-            gone = len(shown.rows) - 2 * half
-            span = len(shown.columns) + 1
-            body.append(f'<tr><td colspan="{span}">{escape(left_out(gone))}</td></tr>')
-    reason = _reason(shown.marks, None, None)
-    level = shown.marks.get((None, None), ("",))[0]
-    above = (
-        f'<div class="tankcal-plain"><div class="{level}">{reason}</div></div>' if reason else ""
-    )
-    return (
-        f'{STYLE}{above}<table class="tankcal-plain"><thead><tr><th>#</th>{head}</tr></thead>'
-        f"<tbody>{''.join(body)}</tbody></table>"
-    )
-
-
-def _row(shown, row):
-    """HTML of a row."""
-    cells = "".join(
-        f"<td{_class_of(shown.marks, row, place, 'number' if column.is_number else '')}>"
-        f"{escape(text)}{_reason(shown.marks, row, place)}</td>"
-        for place, (column, text) in enumerate(zip(shown.columns, shown.rows[row], strict=True))
-    )
-    whole = f"{row + 1}{_reason(shown.marks, row, None)}"
-    return f"<tr><th{_class_of(shown.marks, row, None)}>{whole}</th>{cells}</tr>"
-
-
-def _class_of(marks, row, column, also=""):
-    """HTML attribute with the classes of a cell."""
-    level = marks.get((row, column), ("",))[0]
-    names = " ".join(name for name in (also, level) if name)
-    return f' class="{names}"' if names else ""
-
-
-def _reason(marks, row, column):
-    """HTML of the problem of a cell, or ""."""
-    mark = marks.get((row, column))
-    return f'<small class="reason">{escape(mark[1])}</small>' if mark else ""
-
-
-def list_page(lines, nothing):
-    """HTML of a list [(level, text)], or the text `nothing` if the list is empty."""
-    if not lines:
-        return f"{STYLE}<p>{escape(nothing)}</p>"
-    items = "".join(f'<li class="{level}">{escape(text)}</li>' for level, text in lines)
-    return f'{STYLE}<ul class="tankcal-list">{items}</ul>'
-
-
-def text_page(text):
-    """HTML of a text with a paragraph for each line."""
-    return "".join(f"<p>{escape(line)}</p>" for line in text.splitlines())
-
-
-# ---- results of the last computation
-
-
-def warnings_page(desk):
-    """HTML of warnings of the last computation that the check did not give, or ""."""
-    result = desk.last_run.result
-    known = {warning.text for warning in result.job.warnings}
-    warnings = [warning for warning in result.warnings if warning.text not in known]
-    if not warnings:
-        return ""
-    return list_page([(DOUBTFUL, desk.reader.line(warning)) for warning in warnings], "")
-
-
-def results_page(desk):
-    """HTML of the last computation, without buttons, below the list of written files."""
-    from tankcal.products.workbench.views.page import SavedView
-    from tankcal.record import record_of
-    from tankcal.report.paper import Paper
-
-    paper = Paper(record_of(desk.last_run.result), language=desk.reader.language)
-    names = ", ".join(path.name for path in desk.last_run.files)
-    written = desk.reader.word("written", folder=str(desk.out.resolve()), files=names)
-    above = f"<p>{escape(written)}</p>{warnings_page(desk)}"
-    return f"{above}{SavedView(paper)._repr_html_()}"
