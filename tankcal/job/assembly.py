@@ -59,16 +59,23 @@ class Attached:
     rule : tuple or None
         (Rule, (name, SHA-256, size in bytes)); None in place of the second: the rule ships with
         tankcal; None in place of the pair: no rule given.
+    next_verification : tuple
+        (NextVerification or None, (name, SHA-256, size in bytes) of its rule or None).
     """
 
     mesh: tuple | None
     rule: tuple[Rule, tuple | None] | None
+    next_verification: tuple = (None, None)
 
     @property
     def files(self):
         """(name, SHA-256, size in bytes) of each of these files."""
-        given = (self.mesh and self.mesh[0], self.rule and self.rule[1])
-        return tuple(file for file in given if file)
+        given = (
+            self.mesh and self.mesh[0],
+            self.rule and self.rule[1],
+            self.next_verification[1],
+        )
+        return tuple(dict.fromkeys(file for file in given if file))
 
 
 def read_mesh_file(folder, name, log):
@@ -204,6 +211,7 @@ def make_job(raw, values, tables, attached, measurements, warnings):
         correlations=correlations_of(tables["correlations"]),
         stated=stated_of(tables["stated"]),
         rule=attached.rule and attached.rule[0],
+        next_verification=attached.next_verification[0],
         files=(*frame.files, *(InputFile(*file) for file in attached.files)),
         bottom=_bottom(values, tables["bottom"]),
         deadwood=_deadwood(tables["deadwood"]),

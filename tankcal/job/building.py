@@ -10,7 +10,8 @@ from tankcal.job.checks.extent import has_survey, is_sighted, is_strapped
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.entries import ColumnValues, kind_of, read_columns, read_register, read_settings
 from tankcal.job.equipment import add_shared_register, equipment_used
-from tankcal.job.model.settings import Overruling
+from tankcal.job.model.settings import Overruling, Seal
+from tankcal.job.next_verification import read_next_verification
 from tankcal.job.rule_files import find_rule
 from tankcal.job.tables import (
     REGISTERS,
@@ -74,7 +75,12 @@ def job_of(raw, log, is_whole=True):
             readings = method.read(values, tables, registers, raw)
             attributes = by_method if method.attribute is None else by_attribute
             attributes[method.attribute or method.name] = readings
-    parts = {"overrulings": overrulings, "equipment": equipment, "surveys": by_method}
+    seals = tuple(
+        Seal(name, **{key: str(value or "") for key, value in entry.items()})
+        for name, entry in registers["seals"].items()
+    )
+    parts = {"overrulings": overrulings, "equipment": equipment, "seals": seals}
+    parts["surveys"] = by_method
     return replace(job, **parts, **by_attribute)
 
 
@@ -217,6 +223,7 @@ def _attached(raw, values, log):
     return Attached(
         None if mesh is None else read_mesh_file(raw.folder, mesh, log),
         None if rule is None else find_rule(raw, rule, log),
+        (None, None) if values is None else read_next_verification(raw, values, log),
     )
 
 

@@ -19,6 +19,7 @@ from tankcal.tank.rules.model import (
     DEVIATION_OF,
     GUARDS,
     PERIOD_OF,
+    PLATE,
     RELATIVE_TO,
     SIDES,
     TANKS,
@@ -47,6 +48,7 @@ RULE = (
     *HEAD,
     positive("largest_capacity_m3", "largest tank it is for", 1e9),
     Field("statements", "names", "sentences that it requires in a certificate, in its language"),
+    Field("plate", "names", "entries of the identification plate that it requires, in their order"),
 )
 _SHARED = (Field("tanks", "names", "kinds of tank that it is for"), *SOURCE)
 _PERCENT = positive("limit_percent", "limit in percent", 100)
@@ -78,7 +80,7 @@ LIMITS = {
 }
 
 
-_ENDING = ".toml"
+_ENDING, _OF_TABLE = ".toml", "table.rule"
 
 
 @dataclass(frozen=True)
@@ -139,6 +141,7 @@ class RuleFiles:
                     part=part,
                 )
                 log.problem(file, expected, row, f"[{section}]")
+        self._check_plate(file, head, rows.get("rule"), log)
         if len(log.problems) == problems_before and not limits:
             expected = message(
                 "no_limits",
@@ -155,6 +158,19 @@ class RuleFiles:
             values["clause"] = values["clause"] or ""
         head["remark"] = head["remark"] or ""
         return self.make(head, limits, file)
+
+    def _check_plate(self, file, head, row, log):
+        """Report unknown entries of the identification plate."""
+        for entry in head.get("plate") or ():
+            if entry not in PLATE:
+                expected = message(
+                    "unknown_plate_entry",
+                    "found {entry!r}; expected some of {entries}{hint}",
+                    entry=entry,
+                    entries=[*PLATE],
+                    hint=nearest(entry, PLATE),
+                )
+                log.problem(file, expected, row, "rule.plate")
 
     def _expect_sections(self, part):
         """Message that lists the sections beside an unknown one."""
@@ -203,8 +219,8 @@ def rules_of_one_table():
     return tuple(name for name in shipped_names() if limits_one_table(shipped_rule(name)))
 
 
-def find_rule(raw, name, log):
-    """Find the rule named by table.rule.
+def find_rule(raw, name, log, key="table.rule"):
+    """Find the rule named by a key of the job.
 
     Parameters
     ----------
@@ -214,6 +230,9 @@ def find_rule(raw, name, log):
         Name of a shipped rule or of a file, without a path, as checked by the field.
     log : Log
         Receives the problems.
+    key : str, optional
+        "table.rule" for a rule of a table, "certificate.next_verification_rule" for a rule with
+        a period.
 
     Returns
     -------
@@ -221,30 +240,37 @@ def find_rule(raw, name, log):
         (Rule, (file, SHA-256, size in bytes)); the second is None for a shipped rule. None if no
         valid rule was found.
     """
-    value = raw.settings["table"]["rule"]
-    place = (raw.settings_file, value.row, "table.rule")
+    section, _, entry = key.partition(".")
+    place = (raw.settings_file, raw.settings[section][entry].row, key)
     if name in shipped_names():
-        return _of_one_table(shipped_rule(name), None, place, log)
+        return _for_key(shipped_rule(name), None, place, log)
     path = raw.folder / name
     is_file_name = name.lower().endswith(_ENDING)
     if not (is_file_name and path.exists()):
         missing = message("no_rule_file", "no such file beside the job")
-        _tell_unknown(*place, name, missing, rules_of_one_table(), log)
+        known = rules_of_one_table() if key == _OF_TABLE else shipped_names()
+        _tell_unknown(*place, name, missing, known, log)
         return None
     data = read_beside(raw.folder, name, log, MAX_SETTINGS_BYTES)
     rule = None if data is None else parse_rule(name, data, log)
-    return None if rule is None else _of_one_table(rule, fingerprint(name, data), place, log)
+    return None if rule is None else _for_key(rule, fingerprint(name, data), place, log)
 
 
-def _of_one_table(rule, file, place, log):
-    """(Rule, file) if the rule limits a property of one table; else None and a problem."""
-    if limits_one_table(rule):
+def _for_key(rule, file, place, log):
+    """(Rule, file) if the rule has the limits or the period that the key needs, else None."""
+    if limits_one_table(rule) if place[-1] == _OF_TABLE else rule.periods:
         return rule, file
     expected = message(
         "rule_of_two_tables",
         "limits nothing of one table; expected [uncertainty.NAME] or [deviation.NAME] in it (rules "
         "of periods are for tankcal compare)",
     )
+    if place[-1] != _OF_TABLE:
+        expected = message(
+            "rule_without_period",
+            "the rule has no period; expected a rule with [period.NAME], or next_verification, the "
+            "date for which the customer asked",
+        )
     log.problem(place[0], expected, *place[1:])
     return None
 
@@ -336,6 +362,7 @@ def _make_rule(head, limits, file):
         remark=head["remark"],
         largest_capacity_m3=head["largest_capacity_m3"],
         statements=head["statements"] or (),
+        plate=head["plate"] or (),
         uncertainty=tuple(
             UncertaintyLimit(
                 of=values["of"],

@@ -47,6 +47,7 @@ REGISTERS = {  # name of an entry in each list
     "clouds": "cloud",
     "meters": "meter",
     "equipment": "item",
+    "seals": "seal",
 }
 SETTINGS_FILE = "job.toml"
 SETTINGS_SHEET = "job"

@@ -14,6 +14,8 @@ from tankcal.job.model.settings import (
     Inspection,
     Levels,
     Material,
+    NextVerification,
+    Seal,
     Survey,
     Switches,
     TableSpec,
@@ -287,6 +289,12 @@ class JobAsRead(Saved):
     equipment: list[Equipment] | None = key(
         "used in the survey; left out without a register", default=None, optional=True
     )
+    seals: list[Seal] | None = key(
+        "seal plan; left out without seals.toml", default=None, optional=True
+    )
+    next_verification: NextVerification | None = key(
+        "by a rule or as wished by the customer; left out if none", default=None, optional=True
+    )
 
 
 def saved_parts_of_methods():
@@ -448,5 +456,7 @@ def _head_values(job):
             inspection=job.inspection,
             levels=job.levels,
             equipment=job.equipment or None,
+            seals=job.seals or None,
+            next_verification=job.next_verification,
         ),
     }

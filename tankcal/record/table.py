@@ -268,6 +268,9 @@ class RuleOfTable(Saved):
     statements: list[str] | None = key(
         "required in a certificate, as written there", optional=True, default=None
     )
+    plate: list[str] | None = key(
+        "entries of the identification plate, in their order", optional=True, default=None
+    )
 
 
 class UncertaintyJudged(Saved):
@@ -472,7 +475,12 @@ def rule_of(verdict):
     return verdict and fill_from(
         TableJudged,
         verdict,
-        rule=fill_from(RuleOfTable, verdict.rule, statements=verdict.rule.statements or None),
+        rule=fill_from(
+            RuleOfTable,
+            verdict.rule,
+            statements=verdict.rule.statements or None,
+            plate=verdict.rule.plate or None,
+        ),
         uncertainty=[fill_from(UncertaintyJudged, judged) for judged in verdict.uncertainty],
         deviation=[fill_from(DeviationJudged, judged) for judged in verdict.deviation],
     )

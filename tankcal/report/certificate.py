@@ -10,6 +10,7 @@ from tankcal.job.certificate_entries import missing_entries
 from tankcal.job.plausibility_table import CODES
 from tankcal.methods.base import methods
 from tankcal.report import blocks
+from tankcal.report.plate import draw_plate
 from tankcal.report.scope import find_capability, is_outside_scope
 from tankcal.report.tables.facts import (
     CERTIFICATE,
@@ -19,10 +20,14 @@ from tankcal.report.tables.facts import (
     tank_facts,
 )
 from tankcal.report.uncertainty.method import missing_inputs
+from tankcal.report.uncertainty.stated import stated_U_m3
 
 TO_WRITE_ON = ""  # value that the page style prints as a blank line
 # Entries of [certificate] that other parts of the paper print.
-_ELSEWHERE = ("number", "notice", "survey_end", "authorised_by", "authorised_role")
+_ELSEWHERE = (
+    *("number", "notice", "survey_end", "authorised_by", "authorised_role"),
+    *("next_verification", "next_verification_rule"),
+)
 _PARTIES = (
     *("laboratory", "laboratory_address", "country", "accreditation_number"),
     *("customer", "customer_address", "customer_contact", "place", "date_of_issue", "replaces"),
@@ -137,7 +142,92 @@ def calibration(paper):
     given = paper.record["job"]["certificate"] | {"instruments": _instruments(paper)}
     declared = [(key, given[key]) for key in _CALIBRATION if given.get(key)]
     date, measured = map(paper.facts_of, (SURVEY_DATE, SURVEY))
-    return paper.facts([*date, *declared, *measured])
+    return paper.facts([*date, *declared, *measured, *calibration_facts(paper)])
+
+
+def calibration_facts(paper):
+    """Labels and texts of the noise of the sections and the next verification, as far as known."""
+    facts = (
+        ("section_noise", homogeneity_text(paper)),
+        ("next_verification", next_verification_text(paper)),
+    )
+    return [(key, text) for key, text in facts if text]
+
+
+def homogeneity_text(paper):
+    """Return whether the noise of the sections is homogeneous, by Bartlett's test; None: no test.
+
+    The report calls the noise inhomogeneous exactly where the run warns of it.
+    """
+    test = paper.record.get("homogeneity")
+    if not test or test["p"] is None:
+        return None
+    warned = any(
+        warning.get("code") == "sections_inhomogeneous" for warning in paper.record["warnings"]
+    )
+    word = "inhomogeneous" if warned else "homogeneous"
+    return paper.word(f"certificate.{word}", p=paper.number(test["p"], digits=2))
+
+
+def next_verification_text(paper):
+    """Return the last day of the next verification with its rule, or the customer; None: none."""
+    last = paper.record["job"].get("next_verification")
+    if not last:
+        return None
+    if last["rule"] is None:
+        return paper.word("certificate.verification_wished", day=paper.day(last["date"]))
+    return paper.word(
+        "certificate.verification_by_rule",
+        day=paper.day(last["date"]),
+        rule=last["rule"],
+        clause=last["clause"],
+    )
+
+
+def plate(paper):
+    """Blocks of the identification plate by the rule of the job, drawn; [] without entries.
+
+    The certificate shows the plate of a rule that was compared with its text only.
+    """
+    rule = (paper.record.get("rule") or {}).get("rule", {})
+    if not rule.get("plate"):
+        return []
+    lines = [(_plate_label(paper, entry), _plate_text(paper, entry)) for entry in rule["plate"]]
+    described = "; ".join(f"{label}: {text}" for label, text in lines)
+    caption = paper.word("captions.plate", rule=rule["name"])
+    alt = paper.word("captions.plate_alt", lines=described)
+    return [paper.heading("plate"), blocks.figure(draw_plate(lines), caption, alt)]
+
+
+def _plate_label(paper, entry):
+    return paper.label("certificate_number" if entry.startswith("certificate_number") else entry)
+
+
+def _plate_text(paper, entry):
+    """Return an entry of the plate; a blank line for an entry that the job does not give."""
+    record = paper.record
+    job, certificate = record["job"], record["job"]["certificate"]
+    number = certificate.get("number") or TO_WRITE_ON
+    year = str(certificate.get("date_of_issue") or job["survey"]["date"])[2:4]
+    height = job["datum"]["reference_height_m"]
+    texts = {
+        "laboratory": lambda: paper.laboratory(),
+        "tank_id": lambda: job["tank"]["id"],
+        "certificate_number": lambda: number,
+        "certificate_number_and_year": lambda: f"{number} | {year}",
+        "survey_date": lambda: paper.day(job["survey"]["date"]),
+        "date_of_issue": lambda: paper.day(certificate.get("date_of_issue")),
+        "nominal_volume": lambda: paper.plain(job["tank"]["nominal_volume_m3"], "m³"),
+        "capacity": lambda: paper.number(
+            record["capacity"]["volume_m3"][-1], "m3", u=stated_U_m3(record["capacity"])[-1] or None
+        ),
+        "zero": lambda: paper.word(f"zeros.{record['capacity']['zero']}"),
+        "reference_height": lambda: height and paper.number(height, "m", decimals=3),
+        "reference_temperature": lambda: paper.number(
+            job["table"]["reference_temperature_c"], "degC", digits=3
+        ),
+    }
+    return texts[entry]() or TO_WRITE_ON
 
 
 def _instruments(paper):
@@ -174,6 +264,11 @@ def missing_keys(paper):
     )
 
 
+def entry_labels(paper, keys):
+    """Return the labels of entries of [certificate] (list of str)."""
+    return [paper.word("page.number") if key == "number" else paper.label(key) for key in keys]
+
+
 def title(paper):
     """Return the title of the certificate; it names a draft if required entries are missing."""
     return paper.word("titles.draft" if missing_keys(paper) else "titles.certificate")
@@ -182,8 +277,7 @@ def title(paper):
 def statements(paper):
     """List of statements: items calibrated, copies of the certificate, and missing entries."""
     certificate = paper.record["job"]["certificate"]
-    labels = {"number": paper.word("page.number")}
-    missing = [labels.get(key) or paper.label(key) for key in missing_keys(paper)]
+    missing = entry_labels(paper, missing_keys(paper))
     rule = (paper.record.get("rule") or {}).get("rule", {})
     words = ("certificate.only_items", "texts.copy", "certificate.digits")
     sentences = [paper.word(word) for word in words]
@@ -201,14 +295,16 @@ def statements(paper):
 
 def authorisation(paper):
     """Signature lines, with the name and role of the authorising person if given."""
-    certificate = paper.record["job"]["certificate"]
-    name, role = (certificate.get(key) for key in ("authorised_by", "authorised_role"))
-    person = paper.label("authorised_by")
-    if name:
-        person = paper.word("certificate.authorised", name=name, role=role) if role else name
+    person = authorising_person(paper.record["job"]["certificate"]) or paper.label("authorised_by")
     labels = [paper.label("place_and_date"), person, paper.label("signature")]
     copy = [paper.word(f"certificate.{key}") for key in ("copy", "original")]
     return blocks.signature(labels, paper.word("dcc.sign_here"), copy)
+
+
+def authorising_person(certificate):
+    """Return the name and the function of the authorising person; "" if no name is given."""
+    name, role = (certificate.get(key) for key in ("authorised_by", "authorised_role"))
+    return ", ".join(filter(None, (name, role))) if name else ""
 
 
 def hash_of_record(paper):

@@ -165,6 +165,7 @@ def test_what_the_job_gives_is_there(example):
         "customer": "Cia", "customer_address": "Rua 2", "authorised_by": "A. Silva",
         "authorised_role": "Signatory", "accreditation_number": "CAL 0123", "permit": "own text",
         "date_of_issue": "2026-01-02", "operator": "B. Souza",
+        "method": "tape", "traceability": "SI", "conditions": "calm", "condition_of_tank": "empty",
     }  # fmt: skip
     record["job"]["certificate"] = given
     xml = certificate_of(record).decode()

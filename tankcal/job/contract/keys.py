@@ -316,6 +316,17 @@ CERTIFICATE = (
     _text("authorised_role", "function of the person who authorises the certificate"),
     Field("survey_end", "date", "last day of a survey of several days; [survey] date is the first"),
     Field("date_of_issue", "date", "date of issue, year-month-day"),
+    Field(
+        "next_verification",
+        "date",
+        "last day of the next verification, only if the customer asked for it; year-month-day",
+    ),
+    Field(
+        "next_verification_rule",
+        "rule name",
+        "rule that demands the next verification: a rule of tankcal with a period, or a .toml file"
+        " beside job.toml",
+    ),
     _text("remarks", "remarks to be printed on the certificate"),
     _text("notice", "notice printed on every page, such as RECONSTRUCTION"),
 )

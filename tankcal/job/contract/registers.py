@@ -367,6 +367,12 @@ EQUIPMENT = (  # keys of equipment.toml; no value enters a calculation
     Field("due", "date", "last day on which this calibration may be used, year-month-day"),
     Field("uncertainty", "text", "uncertainty of the certificate, such as: 0.03 mm/m, k = 2"),
 )
+SEALS = (  # keys of seals.toml, the seal plan; no value enters a calculation
+    Field("place", "text", "sealed part, such as: cover of the dip hatch", required=True),
+    Field("mark", "text", "number or mark of the seal, such as: INM 004512"),
+    Field("secures", "text", "parts that the seal secures, such as: datum plate and gauge tube"),
+    Field("attached", "date", "day on which the seal was attached, year-month-day"),
+)
 CAMERA_SETTINGS = (
     _override(
         "default", "scope and state of c x0 y0 K1 K2 K3 P1 P2 and the affinity; blank: camera free"
@@ -383,11 +389,13 @@ SHORT_KEYS = {
     "clouds": {},
     "meters": {},
     "equipment": {},
+    "seals": {},
 }
 REGISTER_KEYS = {
     "cameras": CAMERA,
     "instruments": (*INSTRUMENT, *TAPE, *PLUMMET, *RANGING, *BAR),
     "equipment": EQUIPMENT,
+    "seals": SEALS,
 }
 REGISTERS_OF_SURVEY = {
     "photos": ("cameras", "instruments"),

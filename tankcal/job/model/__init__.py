@@ -23,7 +23,9 @@ from tankcal.job.model.settings import (
     Inspection,
     Levels,
     Material,
+    NextVerification,
     Overruling,
+    Seal,
     StatedVolume,
     Survey,
     Switches,
@@ -152,6 +154,9 @@ class Job:
         Manual decisions against the search for blunders, in the order of the file.
     equipment : tuple of Equipment
         Equipment used in the survey, with its calibrations.
+    seals : tuple of Seal
+        Seal plan of the tank.
+    next_verification : NextVerification or None
     """
 
     tank: Tank | None
@@ -199,3 +204,5 @@ class Job:
     top: Top | None = None
     overrulings: tuple[Overruling, ...] = ()
     equipment: tuple[Equipment, ...] = ()
+    seals: tuple[Seal, ...] = ()
+    next_verification: NextVerification | None = None

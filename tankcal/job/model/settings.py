@@ -277,6 +277,44 @@ class Equipment:
     uncertainty: str = ""
 
 
+@dataclass(frozen=True)
+class Seal:
+    """A seal of the tank (seals.toml); "": not given.
+
+    Attributes
+    ----------
+    place, mark, secures : str
+        Sealed part, number or mark of the seal, and the parts that it secures.
+    attached : str
+        Day on which it was attached.
+    """
+
+    name: str
+    place: str
+    mark: str = ""
+    secures: str = ""
+    attached: str = ""
+
+
+@dataclass(frozen=True)
+class NextVerification:
+    """Last day of the next verification: demanded by a rule or wished by the customer.
+
+    Attributes
+    ----------
+    date : str
+    rule, clause : str or None
+        Rule that demands it; None: the customer asked for the date.
+    years : float or None
+        Period of the rule.
+    """
+
+    date: str
+    rule: str | None = None
+    clause: str | None = None
+    years: float | None = None
+
+
 # ---- manual decisions against the search for blunders, or before it
 
 

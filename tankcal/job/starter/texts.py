@@ -84,6 +84,7 @@ REGISTER_NOTES = {
     "clouds": "one section for each file of a scanner; put a name of your own in place of NAME",
     "meters": "one section for each meter; put its name, as in liquid.csv, in place of NAME",
     "equipment": "one section for each piece of equipment; put its name in place of NAME",
+    "seals": "one section for each seal of the tank; put its name in place of NAME",
 }
 
 

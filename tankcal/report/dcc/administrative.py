@@ -1,7 +1,8 @@
 """Element administrativeData of the XML certificate: laboratory, customer, tank, dates."""
 
 import tankcal
-from tankcal.report.certificate import doubts_of
+from tankcal.job.certificate_entries import missing_entries
+from tankcal.report.certificate import doubts_of, entry_labels, next_verification_text
 from tankcal.report.dcc.elements import (
     CUBIC_METRE,
     METRE,
@@ -28,15 +29,9 @@ _OTHER_ELEMENTS = (  # keys of the certificate with elements of their own
     ),
     *("laboratory", "laboratory_address", "customer", "customer_address"),
     *("authorised_by", "authorised_role", "operator", "notice", "survey_end"),
+    *("next_verification", "next_verification_rule"),
 )
-_REQUIRED = (  # keys whose absence a statement names
-    "country",
-    "laboratory",
-    "laboratory_address",
-    "authorised_by",
-    "customer",
-    "customer_address",
-)
+SEAL_TEXTS = ("place", "mark", "secures", "attached")  # texts of a seal, in their order
 # Codes of the schema for verdicts.
 _CONFORMITY = {"passed": "pass", "failed": "fail", "not_accepted": "noPass"}
 
@@ -169,13 +164,21 @@ def _statements(parent, languages):
         parent, languages.word("dcc.validity"), languages.word("certificate.only_items"),
         "tankcal_validity",
     )  # fmt: skip
-    missing = [key for key in _REQUIRED if not clean(certificate.get(key))]
+    missing = missing_entries(certificate, languages.job["tank"]["details"].get("location"))
+    missing += [] if clean(certificate.get("country")) else ["country"]
     if missing:
-        names = languages.each(lambda paper: ", ".join(map(paper.label, missing)))
+        names = languages.each(lambda paper: ", ".join(entry_labels(paper, missing)))
         add_statement(parent, languages.word("dcc.not_stated"), names, "tankcal_notStated")
     for key in certificate:
         if key not in _OTHER_ELEMENTS and clean(certificate[key]):
             add_statement(parent, languages.label(key), certificate[key], f"tankcal_{_kind(key)}")
+    if languages.job.get("next_verification"):
+        text = languages.each(next_verification_text)
+        names = languages.label("next_verification")
+        add_statement(parent, names, text, "tankcal_nextVerification")
+    for seal in languages.job.get("seals") or ():
+        text = "; ".join(seal[key] for key in SEAL_TEXTS if seal[key])
+        add_statement(parent, languages.word("headings.seals"), text, "tankcal_seal")
     rule = languages.record.get("rule")
     if rule:
         _verdict(parent, languages, rule)

@@ -199,6 +199,25 @@ EQUIPMENT = Table(
     ),
     rows=lambda record: record["job"].get("equipment") or [],
 )
+
+
+def _day_of_seal(paper, row):
+    """Return the day on which a seal was attached; None if not given."""
+    return paper.day(row["attached"]) if row["attached"] else None
+
+
+SEALS = Table(
+    "seals",
+    (
+        Column("name", heading="seal", sheet="seal", width=20),
+        Column("place", heading="seal_place", sheet="seal_place", width=50),
+        Column("mark", heading="seal_mark", sheet="seal_mark", width=20),
+        Column("secures", heading="seal_secures", sheet="seal_secures", width=50),
+        Column("attached", text=_day_of_seal, heading="seal_attached", sheet="seal_attached",
+               width=18),
+    ),
+    rows=lambda record: record["job"].get("seals") or [],
+)  # fmt: skip
 DEADWOOD = Table(
     "deadwood",
     (

@@ -2,7 +2,12 @@
 
 from functools import partial
 
-from tankcal.report.certificate import doubts_of, limits_of_u
+from tankcal.report.certificate import (
+    authorising_person,
+    calibration_facts,
+    doubts_of,
+    limits_of_u,
+)
 from tankcal.report.numbers import unit
 from tankcal.report.tables import overrulings
 from tankcal.report.tables.facts import REFERENCES, SURVEY, SURVEY_DATE, tank_facts
@@ -22,6 +27,10 @@ from tankcal.text.words import choice_sentence, sentence
 _WIDTHS = (36, 20, 24, 14, 14)  # widths of the columns, letters
 _LONG = 60  # largest number of letters beside a label
 _DATES = ("date", "date_of_issue")  # keys of the job with dates
+_ELSEWHERE = (  # keys of the certificate that other parts of the sheet show
+    *("notice", "survey_end", "authorised_by", "authorised_role"),
+    *("next_verification", "next_verification_rule"),
+)
 
 
 def certificate_sheet(book, record):
@@ -50,6 +59,7 @@ def certificate_sheet(book, record):
             book.word("headings.survey"),
             longest=_LONG,
         ),
+        _facts(paper, paper.word("headings.calibration"), calibration_facts),
         Sentences(
             method.sentences(paper, f'"{paper.word("intervals.monte_carlo")}"'),
             title=paper.word("headings.uncertainty"),
@@ -59,7 +69,9 @@ def certificate_sheet(book, record):
         DrawnPart(partial(_draw_corrections, record), sentence(words, "headings", "corrections")),
         Sentences(overrulings.sentences(paper), title=paper.word("headings.overrulings")),
         Sentences(choices, title=sentence(words, "headings", "choices")),
-        DrawnPart(_draw_authorisation, sentence(words, "headings", "authorisation")),
+        DrawnPart(
+            partial(_draw_authorisation, record), sentence(words, "headings", "authorisation")
+        ),
     ]
     content = SheetContent("certificate", sections, landscape=False, tab="result", widths=_WIDTHS)
     write_sheet(book, content)
@@ -76,7 +88,7 @@ def _certificate(record, words):
     return [
         (labels.get(key) or _label(words, key), value, DATE if key in _DATES else None)
         for key, value in record["job"]["certificate"].items()
-        if key != "notice"  # printed at the top
+        if key not in _ELSEWHERE
     ]
 
 
@@ -159,11 +171,13 @@ def _draw_corrections(record, book, sheet, row):
     return row
 
 
-def _draw_authorisation(book, sheet, row):
-    """Write blank lines for name, signature, place and date; return the next row."""
-    line = book.format(bottom=1)
+def _draw_authorisation(record, book, sheet, row):
+    """Write lines for the authorising person, signature, place and date; return the next row."""
+    line, person = book.format(bottom=1), authorising_person(record["job"]["certificate"])
     for below, key in ((1, "authorised_by"), (3, "signature"), (5, "place_and_date")):
         book.put(sheet, row + below, 0, _label(book.words, key))
         for column in (1, 2):
             sheet.write_blank(row + below, column, None, line)
+    if person:
+        book.put(sheet, row + 1, 1, person, bottom=1)
     return row + 6

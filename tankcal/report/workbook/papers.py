@@ -102,6 +102,8 @@ def provenance_sheet(book, record):
     )
     if record["job"].get("equipment"):
         declared += (("equipment", "equipment", tank.EQUIPMENT),)
+    if record["job"].get("seals"):
+        declared += (("seals", "seals", tank.SEALS),)
     sections = [
         cell_table(book, table, name=name, title=book.word(f"headings.{title}"))
         for title, name, table in declared

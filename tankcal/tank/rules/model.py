@@ -23,6 +23,11 @@ RELATIVE_TO = ("itself", "capacity")
 SIDES = ("both", "upper", "lower")
 GUARDS = ("none", "U")
 PERIOD_OF = ("all", "bottom_course")
+PLATE = (  # entries of the identification plate of a tank
+    *("laboratory", "tank_id", "certificate_number", "certificate_number_and_year"),
+    *("survey_date", "date_of_issue", "nominal_volume", "capacity", "zero"),
+    *("reference_height", "reference_temperature"),
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,6 +138,8 @@ class Rule(RuleSet):
         Additional limits of a new table relative to the previous table.
     statements : tuple of str
         Sentences that the rule requires in a certificate, in the language of the rule.
+    plate : tuple of str
+        Entries of the identification plate, some of PLATE, in their order.
     name, source, verified, remark
         As for a RuleSet.
     """
@@ -143,6 +150,7 @@ class Rule(RuleSet):
     reference_height: tuple[ReferenceHeightLimit, ...] = ()
     periods: tuple[Period, ...] = ()
     statements: tuple[str, ...] = ()
+    plate: tuple[str, ...] = ()
 
     @property
     def limits(self):
