@@ -3,8 +3,8 @@
     python benchmarks/run.py [NAME ...]        (default: all; NAME as in BENCHMARKS)
 
 Results go to build/benchmarks.json; `page.py` makes the tables of docs/studies/benchmarks.md of
-them. The exit status is 1 where a benchmark failed or tankcal gave a wrong answer. A ratio that fell against
-the last release (guard.py) is told and changes no status: a clock is no proof.
+them. The exit status is 1 where a benchmark failed or tankcal gave a wrong answer. A ratio that
+fell against the last release (guard.py) is told and changes no status: a clock is no proof.
 """
 
 import datetime
