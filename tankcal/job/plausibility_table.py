@@ -1,6 +1,6 @@
 """Table of plausible ranges and cross-checks in words, with the codes of their messages.
 
-`docs/plausibility.md` shows TABLE; a test compares the two. The limits are defined in
+`docs/plausible-values.md` shows TABLE; a test compares the two. The limits are defined in
 `tankcal.job.plausibility`.
 """
 

@@ -19,7 +19,7 @@ from prose_counts import compare_with_limits
 ROOT = Path(__file__).parents[2]
 LIMITS = Path(__file__).with_suffix(".toml")
 LONGEST = 2200  # words: ten minutes
-GENERATED = ("job-format.md", "saved-keys.md", "record-format.md")
+GENERATED = ("job-format.md", "plausible-values.md", "saved-keys.md", "record-format.md")
 OTHER_KINDS = ("Studies", "For developers")  # headings of docs/index.md outside the sum
 FOREIGN = re.compile(r"(?:comece|empiece|-es\b|-pt-BR\b)")
 SUM, TRANSLATIONS = "words of all pages in English", "words of all translations"

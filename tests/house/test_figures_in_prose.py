@@ -22,7 +22,7 @@ from tankcal.tank.lying import RingedTank
 @pytest.mark.slow
 def test_a_point_that_is_kept(tmp_path):
     printed = figures_of(
-        "docs/overruling.md",
+        "docs/studies/overruling.md",
         "(U = () m³ of () m³) keeping `I 57`, which is () mm inside the wall, takes () m³ off the "
         "volume and makes U () m³",
     )

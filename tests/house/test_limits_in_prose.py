@@ -333,7 +333,7 @@ LIMITS = [
         [STRAPS["repeats_lying"][0]["limit_mm"]],
     ),
     (
-        "docs/spheres.md",
+        "docs/studies/spheres.md",
         "by default () % of the radius. Evenly",
         [PERCENT * circles.OVALITY_SHARE],
     ),
@@ -360,12 +360,12 @@ LIMITS = [
         [MM * OF_SPHERES[3].median_m, math.exp(OF_SPHERES[3].log_sd / 2)],
     ),
     (
-        "docs/reference-lines.md",
+        "docs/studies/reference-lines.md",
         "Beyond (), which chance exceeds in () %",
         [lines_warnings.CRITICAL_LEAN, PERCENT * math.exp(-(lines_warnings.CRITICAL_LEAN**2) / 2)],
     ),
     (
-        "docs/reference-lines.md",
+        "docs/studies/reference-lines.md",
         'of () mm/m (()"), by which two verticals may differ',
         [MM * lines_warnings.VERTICALS, 3600 * math.degrees(lines_warnings.VERTICALS)],
     ),
@@ -923,19 +923,19 @@ LIMITS += [
         ],
     ),
     (
-        "docs/inspection-welds.md",
+        "docs/studies/inspection-welds.md",
         "are divided: () mm across the weld (up to () mm where",
         [MM * welds.ACROSS_M, MM * welds.WIDEST_M],
     ),
-    ("docs/inspection-welds.md", "through the cells within () mm", [MM * boards.END_M]),
-    ("docs/inspection-welds.md", "The middle () mm of a weld", [2 * MM * boards.BEAD_M]),
+    ("docs/studies/inspection-welds.md", "through the cells within () mm", [MM * boards.END_M]),
+    ("docs/studies/inspection-welds.md", "The middle () mm of a weld", [2 * MM * boards.BEAD_M]),
     (
-        "docs/inspection-welds.md",
+        "docs/studies/inspection-welds.md",
         "over all boards deviates by () mm or more",
         [MM * boards.LEAST_BEAD_M],
     ),
     (
-        "docs/inspection-welds.md",
+        "docs/studies/inspection-welds.md",
         "a hole of more than () mm near the weld, an end without wall on both sides, or a step "
         "that no plate has (() mm from",
         [MM * boards.HOLE_M, MM * boards.STEP_M],

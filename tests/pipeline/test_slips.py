@@ -477,7 +477,7 @@ def test_check_reading_against_the_scale_is_reported():
 
 
 def rows_of_docs():
-    text = (DOCS / "plausibility.md").read_text(encoding="utf-8")
+    text = (DOCS / "plausible-values.md").read_text(encoding="utf-8")
     return [
         [cell.strip() for cell in line.strip("| ").split(" | ")]
         for line in text.splitlines()

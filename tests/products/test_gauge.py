@@ -267,12 +267,12 @@ def test_coverage_of_a_sticking_gauge(levels, repeats, tmp_path, figure):
     share = inside / draws
     figure(f"coverage of a sticking gauge, {levels} levels of {repeats}", share.round(3).tolist())
     stated = {
-        (3, 1): figures_of("docs/gauge.md", "| 3 × 1 | () | () | () |"),
-        (3, 3): figures_of("docs/gauge.md", "| 3 × 3 | () | () | () |"),
-        (6, 2): figures_of("docs/gauge.md", "| 6 × 2 | () | () | () |"),
-        (12, 1): figures_of("docs/gauge.md", "| 12 × 1 | () | () | () |"),
+        (3, 1): figures_of("docs/studies/gauge.md", "| 3 × 1 | () | () | () |"),
+        (3, 3): figures_of("docs/studies/gauge.md", "| 3 × 3 | () | () | () |"),
+        (6, 2): figures_of("docs/studies/gauge.md", "| 6 × 2 | () | () | () |"),
+        (12, 1): figures_of("docs/studies/gauge.md", "| 12 × 1 | () | () | () |"),
     }
-    (full,) = figures_of("docs/gauge.md", "() comparisons were simulated")
+    (full,) = figures_of("docs/studies/gauge.md", "() comparisons were simulated")
     assert value_of(full) == draws
     assert agree(share, stated[levels, repeats])
     assert share.min() >= 0.94

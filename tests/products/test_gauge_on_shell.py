@@ -102,8 +102,8 @@ def test_coverage_of_the_corrections_of_a_gauge_on_the_shell(
     share = np.mean(inside, axis=0)
     figure(f"coverage of a gauge on the shell, dips {dip_mm} mm", share.round(3).tolist())
     stated = {
-        0.1: figures_of("docs/gauge.md", "| 0.1 mm | () | () | () |"),
-        1.0: figures_of("docs/gauge.md", "| 1 mm | () | () | () |"),
+        0.1: figures_of("docs/studies/gauge.md", "| 0.1 mm | () | () | () |"),
+        1.0: figures_of("docs/studies/gauge.md", "| 1 mm | () | () | () |"),
     }
     assert agree(share, stated[dip_mm])
     assert share.min() >= 0.92  # 300 draws: 0.95 less 2.4 standard errors
