@@ -105,7 +105,11 @@ def main(target, executed):
             (target / "notebooks" / inside).with_suffix(".md"),
             with_links(page, path.parent, staged),
         )
-    put(target / "gallery.md", gallery(notebooks))
+    put(target / "notebooks.md", list_notebooks(notebooks))
+    sys.path.insert(0, str(ROOT / "docs"))
+    import gallery  # computes the examples
+
+    gallery.write(target)
     for title, modules in REFERENCE.items():
         put(target / f"api/{slug(title)}.rst", api_page(title, modules))
 
@@ -154,7 +158,7 @@ def with_contents(text, notebooks):
     for heading, body in re.findall(r"^## (.+)\n((?:(?!^## ).*\n?)*)", text, flags=re.M):
         names = [goal for _, _, goal in LINK.findall(body) if goal.endswith(".md")]
         parts.append(contents(heading, names))
-    parts.append(contents("Gallery", ["../gallery.md"]))
+    parts.append(contents("Gallery", ["../gallery.md", "../notebooks.md"]))
     parts.append(contents("API reference", [f"../api/{slug(title)}.rst" for title in REFERENCE]))
     examples = [f"../{p.relative_to(ROOT)}" for p in sorted(ROOT.glob("examples/*/README.md"))]
     parts.append(contents("Examples", examples))
@@ -244,10 +248,10 @@ def fenced(text, kind):
     return f"{fence}{kind}\n{text.rstrip()}\n{fence}"
 
 
-def gallery(notebooks):
+def list_notebooks(notebooks):
     """A page of all notebooks: picture, title, first sentence."""
     parts = [
-        "# Gallery",
+        "# Notebooks",
         "Each notebook was executed when this site was built; the results are those of that run.",
     ]
     for path in notebooks:

@@ -20,7 +20,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 LIMITS = Path(__file__).with_suffix(".toml")
-FOREIGN = ("tutorial-es.md", "tutorial-pt-BR.md", "comece-aqui.md", "saved-keys.md")
+FOREIGN = re.compile(r"comece|empiece|-(?:es|pt-BR)\.md|glossary|saved-keys")
 PHRASES = {
     "one": r"one",
     "what is, what the, what it": r"what (?:is|the|it|was)",
@@ -110,7 +110,7 @@ def count_file(path):
 def list_files():
     """Paths of the English pages and of the modules of the package."""
     pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]
-    pages += [path for path in (ROOT / "docs").glob("*.md") if path.name not in FOREIGN]
+    pages += [path for path in (ROOT / "docs").glob("*.md") if not FOREIGN.search(path.name)]
     pages += (ROOT / "docs/studies").glob("*.md")
     return sorted(pages) + sorted((ROOT / "tankcal").rglob("*.py"))
 

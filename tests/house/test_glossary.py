@@ -3,6 +3,7 @@
 import re
 
 import pytest
+from page_sessions import ROOT
 
 from tankcal.messages import fields_of
 from tankcal.text.shipped import DEFAULT, LANGUAGES
@@ -119,3 +120,38 @@ def test_marks_are_set_as_the_language_sets_them(texts, language):
     opened = [(one, text) for one, text in texts["es"].items()
               if text.count("¿") != text.count("?") and "[]:*?" not in text]  # fmt: skip
     assert opened == []
+
+
+def terms():
+    """Rows of docs/glossary.md: English, Portuguese and Spanish term."""
+    text = (ROOT / "docs/glossary.md").read_text(encoding="utf-8")
+    rows = [line.strip("| \n").split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    return rows[2:]
+
+
+def test_the_glossary_has_its_terms_in_three_languages():
+    rows = terms()
+    assert len(rows) >= 120
+    assert [row for row in rows if len(row) != 3] == []
+    names = [row[0].lower() for row in rows]
+    assert names == sorted(set(names))
+
+
+@pytest.mark.parametrize(("language", "column"), [("pt-BR", 1), ("es", 2)])
+def test_words_use_the_terms_of_the_glossary(language, column):
+    path = ROOT / f"report_templates/words/{language}.toml"
+    words = path.read_text(encoding="utf-8").lower()
+    unused = [
+        row[column]
+        for row in terms()
+        if not re.search(rf"\b{re.escape(row[column].lower())}", words)
+    ]
+    assert unused == []
+
+
+@pytest.mark.parametrize(("language", "column"), [("pt-BR", 1), ("es", 2)])
+def test_the_glossary_has_no_term_that_the_words_avoid(language, column):
+    for row in terms():
+        for patterns in GLOSSARY[language].values():
+            found = [one for one in patterns if re.search(one, row[column], re.IGNORECASE)]
+            assert found == [], row

@@ -106,7 +106,7 @@ ONE_IN_500 = (1, 1 / NOMINAL["share"])
 # (page, sentence with () for each figure, figures in the unit of the sentence)
 LIMITS = [
     (
-        "docs/start.md",
+        "docs/measurements.md",
         "blank: () mm for a vertical tank",
         [MM * typical_shape_m()],
     ),
@@ -127,7 +127,7 @@ LIMITS = [
         "unless a file is larger than () MB (`record_tables.npz`: () MB)",
         [attachments.LARGEST / 1e6, attachments.LARGEST_PACKED / 1e6],
     ),
-    ("docs/results.md", "with more than () rows", [MOST_ROWS]),
+    ("docs/saved-keys.md", "with more than () rows", [MOST_ROWS]),
     ("docs/table.md", "A table has at most () rows", [MAX_TABLE_ROWS]),
     ("docs/table.md", "| 1/8 in = () m exactly |", [units.INCH_M / 8]),
     ("docs/table.md", "| 1/16 in = () m exactly |", [units.INCH_M / 16]),

@@ -121,6 +121,35 @@ ROWS_OF_PAGE = {
 }
 
 
+EXPECTED_U = {  # middle half of U over the volume, %
+    "points, one ring": (
+        "docs/start.md",
+        "| points, one ring per course | none | their standard deviations, "
+        "`scale`, `offset`, `datum` | () to () % |",
+    ),
+    "points, two rings": ("docs/start.md", "| points, two rings | none | as above | () to () % |"),
+    "points, three rings": (
+        "docs/start.md",
+        "| points, three rings | none | as above | () to () % |",
+    ),
+    "straps, two a course": (
+        "docs/start.md",
+        "| two straps per course | `--survey strapping` | as above | () to () % |",
+    ),
+    "straps, one a course": ("docs/start.md", "plates, `shape_sd_mm` | () to () % |"),
+    "lines and one strapped course": (
+        "docs/start.md",
+        "plummet and its collimation | () to () % |",
+    ),
+    "hits, one set-up inside": ("docs/start.md", "without targets, or a strap | () to () % |"),
+    "hits, untied set-ups outside": (
+        "docs/start.md",
+        "outside | `--survey wall-hits` | as above | () to () % |",
+    ),
+    "tangents": ("docs/start.md", "of the distances of the traverse | () to () % |"),
+}
+
+
 @dataclass(frozen=True)
 class Judged:
     """A table against the truth; found None: the survey was refused, for the reason in `refusal`.
@@ -306,3 +335,11 @@ def test_intervals_hold_on_independent_shells_study(tmp_path, figure, method):
     full = (of_untied if "untied" in method else full) / 2
     assert shares_agree(held_of(each), stated, shells / 2, full), (held_of(each), stated)
     assert ratios_agree(width_of(each), ratio, shells / 2, full), (width_of(each), ratio)
+    low, high = (float(text) / 100 for text in figures_of(*EXPECTED_U[method]))
+    (drawn, of_slow) = map(
+        int,
+        figures_of("docs/start.md", "middle half of () simulated surveys (() from untied set-ups"),
+    )
+    inside = np.mean([low <= one.total[1] <= high for one in each])
+    full = of_slow if method in LONG else drawn
+    assert shares_agree([inside], ["0.5"], shells, full), inside

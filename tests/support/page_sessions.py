@@ -5,9 +5,12 @@
 A line that ends in **`path`**: names the file that the next block is; where it begins with words
 of APPEND the block goes to the end of that file. A block `console` has commands behind `$ ` and
 what they print; `...` in it stands for anything. `examples` are those of the project. A block
-`pycon` is a session of Python. The language of the terminal is that of the file's name.
+`pycon` is a session of Python. The language of the terminal is that of the file's name. The path
+`JOB/job.xlsx#SHEET` names a sheet of a workbook: the block has its headings and the values typed.
 """
 
+import csv
+import datetime
 import os
 import re
 import shlex
@@ -66,6 +69,9 @@ def run_page(path, folder):
         if block.path is not None:
             target = folder / block.path
             target.parent.mkdir(parents=True, exist_ok=True)
+            if "#" in target.name:
+                fill_sheet(target, block.text)
+                continue
             with target.open("a" if block.append else "w", encoding="utf-8") as file:
                 file.write(block.text)
         elif block.kind == "console":
@@ -77,6 +83,30 @@ def run_page(path, folder):
         elif block.kind == "pycon":
             done.append((block, [("python", "", said_by_python(block.text, folder, path))]))
     return done
+
+
+def fill_sheet(target, text):
+    """Type the rows of a block into a sheet of a workbook, `job.xlsx#courses`."""
+    from filled_forms import fill_form
+
+    name, _, sheet = target.name.partition("#")
+    heading, *lines = csv.reader(text.splitlines(), delimiter=";")
+    rows = [[value_of_cell(cell) for cell in line] for line in lines]
+    path = target.with_name(name)
+    if sheet == "job":
+        settings = {f"{section}.{key}": value for section, key, value in rows}
+        fill_form(path, settings, {})
+    else:
+        fill_form(path, {}, {sheet: [heading, *rows]})
+
+
+def value_of_cell(text):
+    """The value that Excel stores for a typed text: a number, a date, or the text."""
+    if re.fullmatch(r"-?\d+([.,]\d+)?", text):
+        return float(text.replace(",", "."))
+    if re.fullmatch(r"\d{4}-\d\d-\d\d", text):
+        return datetime.date.fromisoformat(text)
+    return text or None
 
 
 def printed_by(command, folder, page):

@@ -7,8 +7,8 @@ from tankcal.job.plausibility_table import TABLE
 PAGE = Path(__file__).parents[2] / "docs/plausible-values.md"
 HEAD = """# Plausible values
 
-This page lists the plausible range of each number of a job, the typical error that it detects, and
-the number with which it is compared. It is generated from `tankcal/job/plausibility_table.py` by
+This page lists the plausible range of each number of a job, the error that it detects, and its
+reference. It is generated from `tankcal/job/plausibility_table.py` by
 `make job-format`. The checks are explained in [plausibility checks](plausibility.md).
 
 | what | plausible range | typical error detected | compared with |
