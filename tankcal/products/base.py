@@ -21,6 +21,7 @@ _BUILT_IN = (  # in the order of `tankcal --help`
     "tankcal.products.shipped:Planning",
     "tankcal.products.linter:Linter",
     "tankcal.products.recalibration:FormerTables",
+    "tankcal.products.register:Register",
     "tankcal.products.exports:Exports",
     "tankcal.products.inspection:Inspection",
     "tankcal.products.quantity:Quantity",

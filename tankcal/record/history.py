@@ -40,6 +40,15 @@ class CertificateInHistory(Saved):
     rule_verdict: str | None = key("code of the verdict, as `rule.code` of a record; null: none")
     sigma0: float | None = key("of its adjusted survey; null: none, or no redundancy")
     global_test_passed: bool | None = key("of the adjustment; null: not tested")
+    state: str | None = key(
+        'in the register: "issued", "replaced", "withdrawn" or "not_registered"; left out without '
+        "a register",
+        default=None,
+        optional=True,
+    )
+    state_since: str | None = key(
+        "date of the state, ISO; left out if not registered", default=None, optional=True
+    )
 
 
 class RadiusInHistory(Saved):

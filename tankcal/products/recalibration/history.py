@@ -56,7 +56,15 @@ class DatedTable:
 
 
 def history_of(
-    tables, inspections=(), *, dips_m=None, courses=None, left_out=(), warnings=(), progress=None
+    tables,
+    inspections=(),
+    *,
+    dips_m=None,
+    courses=None,
+    register=None,
+    left_out=(),
+    warnings=(),
+    progress=None,
 ):
     """Return the history of a tank.
 
@@ -69,6 +77,8 @@ def history_of(
         Dips of the volumes shown; None: fifths of the common range of all tables.
     courses : (heights, thicknesses), optional
         Courses of an upright tank, m, if no record has them.
+    register : dict, optional
+        {number: RegisteredCertificate} of `products.register`; None: states are not known.
     left_out, warnings : sequence of Problem
         Problems met while files were searched and read.
     progress : callable, optional
@@ -100,13 +110,13 @@ def history_of(
     k = coverage_factor(_newest_with_U(ordered))
     rows = _select_dips(on_newest, dips_m)
     newest = ordered[-1].table
-    problems = [*warnings, *_table_warnings(ordered)]
+    problems = [*warnings, *_table_warnings(ordered), *_register_warnings(ordered, register)]
     return HistoryFile(
         notice=_notice(newest),
         tank=next((table.tank for table in reversed(ordered) if table.tank), None),
         kind=newest.kind or ordered[0].table.kind,
         coverage_k=k,
-        certificates=_certificates(ordered),
+        certificates=_certificates(ordered, register),
         dips_m=rows,
         volumes=[
             volume
@@ -178,7 +188,31 @@ def _notice(table):
 # ---- content of the file
 
 
-def _certificates(ordered):
+def _register_warnings(ordered, register):
+    """Yield a Problem for each certificate whose number the register has for another record."""
+    for dated in ordered:
+        entry = (register or {}).get(str(dated.table.number or "").strip())
+        if entry and dated.table.record is not None and entry.record_sha256 != dated.sha256:
+            text = message(
+                "history_other_record",
+                "number {number} is registered for another record; expected the record that the "
+                "register names",
+                number=entry.number,
+            )
+            yield Problem(dated.table.name, text)
+
+
+def _state(table, register):
+    """Return the state of a certificate and its date, as keys of CertificateInHistory."""
+    if register is None:
+        return {}
+    entry = register.get(str(table.number or "").strip())
+    if entry is None:
+        return {"state": "not_registered"}
+    return {"state": entry.state, "state_since": entry.since}
+
+
+def _certificates(ordered, register):
     days = [table.day.isoformat() for table in ordered]
     certificates = []
     for number, (dated, after) in enumerate(zip(ordered, [*days[1:], None], strict=True), 1):
@@ -213,6 +247,7 @@ def _certificates(ordered):
                 rule_verdict=rule and rule["code"],
                 sigma0=fit and fit["sigma0"],
                 global_test_passed=fit and fit["passed"] if fit and fit["redundancy"] else None,
+                **_state(table, register),
             )
         )
     return certificates

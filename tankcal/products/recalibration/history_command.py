@@ -58,6 +58,11 @@ def add(commands):
         help="courses.csv of a vertical tank, if no record contains its courses",
     )
     history.add_argument(
+        "--register",
+        metavar="FILE",
+        help="register of certificates (tankcal register): states issued, replaced, withdrawn",
+    )
+    history.add_argument(
         "--out", metavar="DIR", help="write history.json and reports to this folder, all or nothing"
     )
     add_language(history)
@@ -83,6 +88,7 @@ def _history(options):
             tanks=options.tank,
             dips_m=options.at,
             courses=options.courses,
+            register=options.register,
             progress=show.part,
         )
     )
@@ -96,6 +102,7 @@ def _history(options):
 def _tell(history):
     """Print warnings and a line for each certificate, change and inspection."""
     from tankcal.report.history import HistoryPaper
+    from tankcal.report.history.tables import state_text
 
     paper = HistoryPaper(history, language_of_run())
     warn(paper.warning(warning) for warning in history["warnings"][:MOST_SHOWN])
@@ -103,7 +110,8 @@ def _tell(history):
         say(message("history_left_out", "not in the history: {text}", text=paper.warning(omission)))
     say(_span(history))
     for certificate in history["certificates"]:
-        say(_certificate(certificate))
+        state = state_text(paper, certificate)
+        say(_certificate(certificate, state))
     for change in history["changes"]:
         say(_change(change, paper))
     for inspection in history["inspections"]:
@@ -127,7 +135,7 @@ def _span(history):
     )
 
 
-def _certificate(certificate):
+def _certificate(certificate, state):
     U = ""
     if certificate["U_top_m3"] is not None:
         U = message(
@@ -135,7 +143,8 @@ def _certificate(certificate):
         )
     return message(
         "history_row",
-        "  {number}  {date}  {volume} m3 at {dip} m{uncertainty}  {name}",
+        "  {number}  {date}  {volume} m3 at {dip} m{uncertainty}  {name}{state}",
+        state=f", {state}" if state else "",
         number=certificate["certificate"],
         date=certificate["date"],
         volume=_volume(certificate["top_volume_m3"]),

@@ -15,6 +15,7 @@ from tankcal.messages import list_some, message
 from tankcal.products.recalibration.comparison import read_course_sizes, rows_file
 from tankcal.products.recalibration.history import DatedTable, history_of
 from tankcal.products.recalibration.reading import read_former
+from tankcal.products.register.certificates import read_certificates
 from tankcal.record.history import CheckInHistory, InspectionInHistory
 from tankcal.record.inspection import INSPECTION, VERDICTS
 from tankcal.text.delimited import decode_text, find_encoding
@@ -75,7 +76,7 @@ class HistoryArchive:
         self.ids[tank] = self.ids.get(tank, 0) + 1
 
 
-def history_of_files(paths, *, tanks=(), dips_m=None, courses=None, progress=None):
+def history_of_files(paths, *, tanks=(), dips_m=None, courses=None, register=None, progress=None):
     """Return the history of the tank whose results are in the given folders.
 
     Parameters
@@ -89,6 +90,8 @@ def history_of_files(paths, *, tanks=(), dips_m=None, courses=None, progress=Non
         As in `history_of`.
     courses : path, optional
         courses.csv of an upright tank, if no record has its courses.
+    register : path, optional
+        Register of certificates (`products.register`), for the states of the certificates.
     progress : callable, optional
         As in `history_of`.
 
@@ -117,6 +120,12 @@ def history_of_files(paths, *, tanks=(), dips_m=None, courses=None, progress=Non
     log = Log()
     shell = None if courses is None else read_course_sizes(Path(courses), log)
     archive.problems += log.problems
+    certificates = {}
+    if register is not None:
+        try:
+            certificates = read_certificates(register)
+        except InputError as error:
+            archive.problems += error.problems
     if archive.problems:
         raise InputError(archive.problems)
     _refuse_several(archive, paths)
@@ -127,6 +136,7 @@ def history_of_files(paths, *, tanks=(), dips_m=None, courses=None, progress=Non
         archive.inspections,
         dips_m=dips_m,
         courses=shell,
+        register=None if register is None else certificates,
         left_out=archive.left_out,
         warnings=archive.warnings,
         progress=progress,

@@ -37,6 +37,14 @@ def _code(key, group, on=None):
     return Column(key, text=text, csv=key, sheet=True, width=20, on=on)
 
 
+def state_text(paper, row):
+    """Return the state of a certificate in the register with its date; None without a register."""
+    if row.get("state") is None:
+        return None
+    state = paper.words["certificate_states"][row["state"]]
+    return f"{state} {row['state_since']}" if row.get("state_since") else state
+
+
 _FACTS = "certificate_facts"
 CERTIFICATES = Table(
     "certificates",
@@ -46,6 +54,8 @@ CERTIFICATES = Table(
         _day("superseded", on="certificates"),
         _text("number", on="certificates"),
         _text("laboratory", on="certificates"),
+        Column("state", text=state_text, csv="state", sheet=True, width=22, on="certificates",
+               optional=True),
         _text("method", width=40, on=""),
         Column("top_dip_m", "m", height=True, csv="top_dip_m", on="certificates", **_SHOWN),
         Column("top_volume_m3", "m3", decimals=LITRE_DECIMALS, csv="top_volume_m3",
