@@ -44,6 +44,7 @@ check: $(VENV)/full ## style, layers, words and names to avoid, structure, noteb
 	$(BIN)/python notebooks/stripped.py notebooks report_templates
 	$(BIN)/python tests/house/prose_counts.py
 	$(BIN)/python tests/house/page_counts.py
+	$(BIN)/python tests/house/spelling.py
 	$(BIN)/python tests/house/structure_counts.py
 
 format: $(VENV)/full ## format the code and mend what ruff can
