@@ -45,13 +45,9 @@ UNITS = {
     "m2": Unit("m²"),
     "m3": Unit("m³", least=TABLE_DECIMALS["m3"]),
     "m3/unit": Unit("m³/unit"),
-    "L/unit": Unit("L/unit", float(1 / VOLUME_UNITS_M3["L"])),
-    "bbl/unit": Unit("bbl/unit", float(1 / VOLUME_UNITS_M3["bbl"])),
-    "L": Unit("L", float(1 / VOLUME_UNITS_M3["L"])),
     "m3/h": Unit("m³/h"),
     "L/h": Unit("L/h", 1e3),
     "L/m": Unit("L/m", 1e3),
-    "bbl": Unit("bbl", float(1 / VOLUME_UNITS_M3["bbl"]), TABLE_DECIMALS["bbl"]),
     "kg": Unit("kg"),
     "mm/m": Unit("mm/m", 1e3),
     "deg": Unit("°"),
@@ -73,7 +69,12 @@ UNITS = {
     "rad arcsec": Unit("″", ARCSEC_PER_RAD),
     "deg arcsec": Unit("″", ARCSEC_PER_DEG),
     "L/cm": Unit("L/cm", 10.0),  # an area of 1 m2 holds 10 litres per centimetre
+    "cm": Unit("cm", 1e2),
 }
+for _name, _size in VOLUME_UNITS_M3.items():
+    if _name != "m3":
+        UNITS[_name] = Unit(_name, float(1 / _size), TABLE_DECIMALS[_name])
+        UNITS[f"{_name}/unit"] = Unit(f"{_name}/unit", float(1 / _size))
 
 
 # Units of readings and of their residuals: {unit in the record: (printed unit, factor)}.

@@ -73,11 +73,30 @@ def check_steps(table, extent, raw, log):
         tell(log.problem, raw, "table", "fine_step_m", expected)
 
 
+def ullage_without_reference():
+    """Message about ullages without the height from which they are measured."""
+    return message(
+        "ullage_without_reference",
+        "ullages are measured from the reference height; expected datum.reference_height_m",
+    )
+
+
 def _check_presence(table, raw, log):
     def tell_problem(key, expected):
         tell(log.problem, raw, "table", key, expected)
 
     is_in_inches, step = table["height_unit"] in INCH_STEPS_M, table["step_m"]
+    if is_in_inches and table["heights_in"] is not None:
+        tell_problem(
+            "heights_in",
+            message(
+                "two_units_of_heights",
+                "given beside height_unit = {unit}; expected a single unit of heights",
+                unit=table["height_unit"],
+            ),
+        )
+    if table["ullage"] and is_not_given(raw, "datum", "reference_height_m"):
+        tell_problem("ullage", ullage_without_reference())
     if is_in_inches and step is not None:
         tell_problem(
             "step_m",

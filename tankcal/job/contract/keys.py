@@ -31,8 +31,20 @@ TABLE = (
     ),
     choice(
         "volume_unit",
-        "unit of all volumes in the report: m3, L, or bbl (42 US gallons); blank: m3",
-        ("m3", "L", "bbl"),
+        "unit of all volumes in the report: m3, L, hL, bbl (42 US gallons), US gal or imp gal;"
+        " blank: m3",
+        ("m3", "L", "hL", "bbl", "US gal", "imp gal"),
+    ),
+    choice(
+        "heights_in",
+        "heights of the printed table, if height_unit is m: m, or cm for a table of centimetres"
+        " with parts of millimetres; blank: m",
+        ("m", "cm"),
+    ),
+    Field(
+        "ullage",
+        "flag",
+        "true: the table also has the ullage of each row, from the reference height; blank: false",
     ),
     positive("fine_step_m", "smaller step within fine_zones, metres"),
     Field(

@@ -157,7 +157,11 @@ class TableSpec:
     height_unit : str
         "m", "ft-in-8" or "ft-in-16" (rows of 1/8 and 1/16 inch).
     volume_unit : str
-        "m3", "L" or "bbl" (42 US gallons).
+        "m3", "L", "hL", "bbl" (42 US gallons), "US gal" or "imp gal".
+    heights_in : str or None
+        "cm": heights of the printed table in centimetres; None: metres.
+    ullage : bool or None
+        True: the table has the ullage of each row.
     other_densities_kg_m3 : tuple of float
         Densities of further tables.
     fine_step_m, fine_zones : float or None
@@ -191,6 +195,8 @@ class TableSpec:
     fine_zones: tuple[tuple[float, float], ...] = ()
     max_interpolation_error_m3: float | None = None
     height_expansion: bool = False
+    heights_in: str | None = field(default=None, metadata={"optional": True})
+    ullage: bool | None = field(default=None, metadata={"optional": True})
     pressure_pa: float | None = field(default=None, metadata={"optional": True})
 
 

@@ -66,7 +66,9 @@ def _check_options(options):
     """Refuse options that contradict each other, a missing reason, and a bad date."""
     problems = []
     if options.withdraw and options.issue:
-        text = message("register_two_actions", "given together with --issue; expected a single action")
+        text = message(
+            "register_two_actions", "given together with --issue; expected a single action"
+        )
         problems.append(Problem("--withdraw", text))
     if options.withdraw and not (options.reason or "").strip():
         text = message("register_no_reason", "missing; expected the reason of the withdrawal")

@@ -45,7 +45,7 @@ FILE = "certificate.xml"
 _GROUPS = (  # groups of words for a record without survey, warning or decision
     *("language", "dcc", "certificate", "titles", "headings", "labels", "captions", "texts"),
     *("choices", "inputs", "kinds", "sides", "zeros", "parts", "units", "yes_no"),
-    *("rule_codes", "rule_texts", "formulas", "datum", "tank_limits"),
+    *("rule_codes", "rule_texts", "formulas", "datum", "tank_limits", "table_headings"),
 )
 _UNITS = {  # {printed unit: unit of the value}; values are in SI, angles in degrees
     "m": METRE,
@@ -216,6 +216,10 @@ def _capacity(parent, languages):
     text = languages.each(lambda paper: _table_description(paper, capacity))
     add_text(table, "description", text)
     add_real_list(table, "dip", capacity["height_m"], METRE, languages.word("dcc.dip"))
+    if job["table"].get("ullage"):
+        reference = job["datum"]["reference_height_m"]
+        ullages = [round(reference - height, 6) for height in capacity["height_m"]]
+        add_real_list(table, "ullage", ullages, METRE, languages.word("table_headings.ullage_m"))
     names = languages.word("dcc.volume")
     numbers = add_real_list(
         table, "volume", capacity["volume_m3"], CUBIC_METRE, names, kind="basic_measuredValue"

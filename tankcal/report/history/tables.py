@@ -183,7 +183,7 @@ def volume_rows(history):
 
 
 def radius_rows(history):
-    """Return rows of RADII, by course, then by certificate, with the change since the last certificate."""
+    """Return rows of RADII, by course, then by certificate, with the change since the previous."""
     days = _dates(history)
     changes = {
         (change["new"], radius["course"]): radius

@@ -4,7 +4,7 @@ from tankcal.record.columns import rows_of
 from tankcal.report import numbers
 from tankcal.report.tables.table import Column, Table
 from tankcal.report.uncertainty.stated import MARK, flag_simulated, k_of_rows, stated_U_m3
-from tankcal.text.digits import LITRE_DECIMALS, round_u
+from tankcal.text.digits import LITRE_DECIMALS, decimals_of_height, round_u
 
 # Names of the capacity tables in the papers.
 PRINTED = "capacity capacity_marked capacity_k capacity_k_marked capacity_monte_carlo"
@@ -33,6 +33,9 @@ def capacity_columns(record):
         columns["by_monte_carlo"] = [MARK if is_simulated else None for is_simulated in simulated]
     if not all(capacity["for_use"]):
         columns["for_use"] = capacity["for_use"]
+    if spec.get("ullage"):
+        reference = record["job"]["datum"]["reference_height_m"]
+        columns["ullage_m"] = [round(reference - height, 6) for height in capacity["height_m"]]
     if spec["height_unit"] != "m":
         columns["dip"] = capacity["dip"]
     if spec["volume_unit"] != "m3":
@@ -43,6 +46,24 @@ def capacity_columns(record):
     for density in record["densities"]:
         columns[_key_at_density(density)] = density["volume_m3"]
     return columns
+
+
+def height_column(spec, key, **more):
+    """Return a column of heights of the printed table, in metres or centimetres.
+
+    Whole centimetres have no decimals in a table of centimetres. The workbook keeps metres.
+    """
+    if spec.get("heights_in") != "cm":
+        return Column(key, "m", height=True, **more)
+    in_sheet = {"unit": "m", "decimals": None, "height": True}
+    return Column(key, "cm", decimals=lambda row: _decimals_of_cm(row[key]), in_sheet=in_sheet,
+                  **more)  # fmt: skip
+
+
+def _decimals_of_cm(height_m):
+    """Return the decimals of a height in centimetres: 0 for whole centimetres, else 1 to 3."""
+    is_whole = round(100 * height_m, 3) == round(100 * height_m)
+    return 0 if is_whole else decimals_of_height(height_m) - 2
 
 
 def _key_at_density(density):
@@ -70,6 +91,7 @@ def capacity_table(record):
     least, named = numbers.unit(unit).least, {"unit": unit}
     with_volume = f"{PRINTED} capacity_density"
     everywhere = f"{with_volume} field_table uneven"
+    ullage = "" if in_feet else f"{with_volume} field_table"
     cubic = {"unit": "m3", "u": "stated_U_m3", "least": LITRE_DECIMALS, "decimals": None}
     densities = [_key_at_density(density) for density in record["densities"]]
     return Table(
@@ -78,8 +100,10 @@ def capacity_table(record):
             Column("dip", on=everywhere, sheet="dip_ft_in", width=16, csv="dip", optional=True),
             Column("in_unit", unit, u="stated_U_m3", least=least, on="", sheet="volume_in",
                    named=named, width=18, optional=True),
-            Column("height_m", "m", height=True, on="" if in_feet else everywhere,
-                   sheet="dip_height_m", width=10, csv="height_m"),
+            height_column(spec, "height_m", on="" if in_feet else everywhere,
+                          sheet="dip_height_m", width=10, csv="height_m"),
+            height_column(spec, "ullage_m", on=ullage, sheet="ullage_m", width=10,
+                          csv="ullage_m", optional=True),
             Column("volume_m3", unit, u="U_m3", least=least, decimals=least, on=with_volume,
                    sheet="volume_m3", width=11, csv="volume_m3", in_sheet=cubic),
             Column("volume_m3", unit, decimals=least, on="field_table"),
@@ -122,12 +146,13 @@ def part_rows(record):
 
 def parts_table(record):
     """Return the Table of the proportional parts of a record."""
-    unit = record["job"]["table"]["volume_unit"]
+    spec = record["job"]["table"]
+    unit = spec["volume_unit"]
     ends = (("bottom_m", "from_m"), ("top_m", "to_m"))
     return Table(
         "proportional_parts",
         (
-            *(Column(key, "m", height=True, sheet=code, width=10) for key, code in ends),
+            *(height_column(spec, key, sheet=code, width=10) for key, code in ends),
             *(
                 Column(f"part_{n}", unit, digits=4, sheet="part_l", named={"millimetres": n},
                        width=11, in_sheet={"unit": "L", "digits": None, "decimals": 1})

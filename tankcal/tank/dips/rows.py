@@ -30,10 +30,14 @@ INCHES_PER_FOOT = 12
 VOLUME_UNITS_M3 = {
     "m3": Fraction(1),
     "L": Fraction(1, 1000),
+    "hL": Fraction(1, 10),
     "bbl": 42 * 231 * METRES_PER_INCH**3,
+    "US gal": 231 * METRES_PER_INCH**3,
+    "imp gal": Fraction(454_609, 100_000_000),
 }
 
-TABLE_DECIMALS = {"m3": LITRE_DECIMALS, "L": 0, "bbl": 2}  # least number of decimals of a row
+# Least number of decimals of a row; a unit of the last digit is 10 L or less.
+TABLE_DECIMALS = {"m3": LITRE_DECIMALS, "L": 0, "hL": 2, "bbl": 2, "US gal": 0, "imp gal": 0}
 
 # Smallest step of a table in each unit of heights, as a fraction of a metre.
 HEIGHT_STEPS_M = {
