@@ -26,6 +26,7 @@ _BUILT_IN = (  # in the order of `tankcal --help`
     "tankcal.products.inspection:Inspection",
     "tankcal.products.quantity:Quantity",
     "tankcal.products.gauge:Gauge",
+    "tankcal.products.upkeep:Upkeep",
     "tankcal.products.shipped:Cameras",
     "tankcal.products.intercomparison:Intercomparison",
     "tankcal.products.shipped:Help",

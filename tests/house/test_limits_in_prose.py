@@ -60,6 +60,9 @@ from tankcal.products.recalibration import (
     solid_geometry,
     verdict,
 )
+from tankcal.products.upkeep import estimation, flows, watching
+from tankcal.products.upkeep import reading as upkeep
+from tankcal.products.upkeep import upkeep as results_of_upkeep
 from tankcal.record.columns import MOST_ROWS
 from tankcal.report import attachments, letterhead
 from tankcal.report.inspection import paper as inspection_paper
@@ -498,6 +501,29 @@ LIMITS += [
         ],
     ),
     ("docs/gauge.md", "Below () %, the residuals alone", [PERCENT * deviation.LEAST_PROBABILITY]),
+    (
+        "docs/upkeep.md",
+        "a counter that falls from above () % to below () % of a power of ten",
+        [PERCENT * (1 - flows.ROLLOVER), PERCENT * flows.ROLLOVER],
+    ),
+    (
+        "docs/upkeep.md",
+        "Over () % of unused levels cause a warning, over () % a refusal",
+        [PERCENT * upkeep.UNUSED_WARNED, PERCENT * upkeep.UNUSED_REFUSED],
+    ),
+    (
+        "docs/upkeep.md",
+        "Steps with |w| over () are rejected, at most () %",
+        [estimation.OUTLIER, PERCENT * estimation.MOST_REJECTED],
+    ),
+    ("docs/upkeep.md", "fewer than () steps", [estimation.LEAST_STEPS]),
+    ("docs/upkeep.md", "(u over () % of the content)", [PERCENT * results_of_upkeep.WIDE]),
+    (
+        "docs/upkeep.md",
+        "blocks of () days of the tank's own innovations. Below () days the limit is provisional: "
+        "() times that of the model. A cause is named only if no other cause is within () of",
+        [watching.BLOCK_DAYS, watching.LEAST_TANK_DAYS, watching.PROVISIONAL, watching.ALIKE],
+    ),
     (
         "docs/studies/read-table.md",
         "deviate by more than () % of the highest volume",

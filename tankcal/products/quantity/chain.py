@@ -136,7 +136,7 @@ def follow_chain(table, gauging, product, vcf_error=0.0):
     shell_c = shell_temperature_c(
         gauging.temperature_c, gauging.ambient_c, insulated=product.is_insulated
     )
-    ctsh = _shell_factor(table, gauging.level_m, shell_c, product.expansion_per_k)
+    ctsh = table_shell_factor(table, gauging.level_m, shell_c, product.expansion_per_k)
     base = product.base_density()
     vcf = product.correction.factor(base, gauging.temperature_c, gauging.pressure_kpa)
     vcf = vcf * (1 + vcf_error)
@@ -155,7 +155,7 @@ def follow_chain(table, gauging, product, vcf_error=0.0):
     )  # fmt: skip
 
 
-def _shell_factor(table, level_m, shell_c, expansion_per_k):
+def table_shell_factor(table, level_m, shell_c, expansion_per_k):
     """CTSh of each dip: of a shell on its bottom, or of a solid that expands in all directions."""
     if table.kind == "vertical":
         return shell_factor(shell_c, table.temperature_c, expansion_per_k)
@@ -186,7 +186,7 @@ def fill_to(table, level_m, steps, expansion_per_k):
         m3.
     """
     level = np.full(np.shape(steps.tov_m3), level_m)
-    ctsh = _shell_factor(table, level, steps.shell_c, expansion_per_k)
+    ctsh = table_shell_factor(table, level, steps.shell_c, expansion_per_k)
     # Below its critical zone the roof rests on its legs, and displaces no liquid.
     fra = np.where(table.is_critical(level), 0.0, steps.fra_m3)
     return table.volume(level) * ctsh + fra

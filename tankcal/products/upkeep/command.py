@@ -1,0 +1,112 @@
+"""`tankcal upkeep`: a calibration kept up by everyday data."""
+
+from pathlib import Path
+
+from tankcal.messages import message
+from tankcal.terminal.arguments import add_language, add_letterhead, read_letterhead
+from tankcal.terminal.showing import (
+    Progress,
+    add_json,
+    language_of_run,
+    marks,
+    prepare_for_small_work,
+    print_paths,
+    print_saved,
+    say,
+    speak,
+    warn,
+)
+from tankcal.text.digits import format_with_u
+
+
+def add(commands):
+    """Add the parser of `tankcal upkeep`."""
+    upkeep = commands.add_parser(
+        "upkeep",
+        help="keep up a calibration by level logs, meters and delivery tickets",
+        description="From level logs, meters and delivery tickets of a tank in service to its "
+        "improved table, the factors of its meters and a monthly leak rate, each with U, and to "
+        "alarms. See docs/upkeep.md.",
+        epilog="exit status: 0 done, also with an alarm; 2 the input must be corrected (one line "
+        "per problem: file, row, column, expected value).",
+    )
+    upkeep.add_argument("folder", metavar="DIR", help="folder with upkeep.toml and the logs")
+    upkeep.add_argument(
+        "--new", action="store_true", help="create the folder with empty input files to fill in"
+    )
+    upkeep.add_argument(
+        "--out",
+        metavar="DIR",
+        help="write report, upkeep.json, workbook and CSV files to this folder, all at once",
+    )
+    add_letterhead(upkeep)
+    add_language(upkeep)
+    upkeep.add_argument("--quiet", action="store_true", help="no progress, only problems")
+    add_json(upkeep)
+    upkeep.set_defaults(command=_upkeep)
+
+
+def _upkeep(options):
+    prepare_for_small_work()
+    speak(options.language)
+    if options.new:
+        from tankcal.products.upkeep.starter import write_starter
+
+        print_paths(options.folder, write_starter(options.folder, language_of_run()))
+        return
+    from tankcal.products.upkeep.paper import DOCUMENT
+    from tankcal.products.upkeep.reading import read_upkeep
+    from tankcal.products.upkeep.upkeep import keep_up
+    from tankcal.record.schema import to_plain
+
+    letterhead = read_letterhead(options)
+    if options.out is not None:
+        DOCUMENT.refuse_foreign(options.out)
+    show = Progress(options.quiet or options.machine)
+    show.step(message("upkeep_reading", "reading the logs"))
+    inputs = read_upkeep(options.folder)
+    if options.language is None and inputs.sections["upkeep"]["language"] is not None:
+        speak(inputs.sections["upkeep"]["language"])
+    show.step(message("upkeep_estimating", "estimating the tank"))
+    upkeep = to_plain(keep_up(inputs))
+    written = ()
+    if options.out is not None:
+        written = DOCUMENT.write(
+            upkeep, Path(options.out), language_of_run(), show.step, letterhead
+        )
+    show.end()
+    print_saved(options, upkeep, _tell, written)
+
+
+def _tell(upkeep):
+    """Print warnings, result, meters, the last month and the alarm."""
+    from tankcal.products.upkeep.paper import UpkeepPaper
+
+    paper = UpkeepPaper(upkeep, language_of_run())
+    warn(paper.warning(warning) for warning in upkeep["warnings"])
+    for sentence in (paper.result(), *paper.reasons()):
+        say(sentence)
+    for meter in upkeep["meters"]:
+        written = format_with_u(meter["deviation_percent"], meter["U_percent"], marks())
+        say(
+            message(
+                "upkeep_meter_line",
+                "meter {name}: {deviation} %, U = {U} %",
+                name=meter["name"],
+                deviation=written.value,
+                U=written.uncertainty,
+            )
+        )
+    last = upkeep["months"][-1]
+    written = format_with_u(last["leak_l_h"], last["U_l_h"], marks())
+    say(
+        message(
+            "upkeep_leak_line",
+            "{month}: loss {leak} L/h, U = {U} L/h: {verdict}",
+            month=last["month"],
+            leak=written.value,
+            U=written.uncertainty,
+            verdict=paper.words["verdicts"][last["verdict"]],
+        )
+    )
+    say(paper.alarm())

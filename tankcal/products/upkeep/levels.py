@@ -1,0 +1,238 @@
+"""Levels in the quiet windows of a tank: means of pieces, accumulated while the logs are read."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.products.upkeep.clocks import NOT_A_TIME
+
+PIECE_NS = 3600 * 10**9  # longest piece of a quiet window
+STUCK_STEPS = 8  # movement of the level, in quanta, that a stuck float has missed
+LINE_ROWS, LINE_M = 6, 1e-9  # a straight line through so many rows is an interpolation
+OVERLAP = 400_000  # rows in which a late row is compared with earlier rows
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Means of readings in pieces of the quiet windows, in order of time; (n,) each.
+
+    Attributes
+    ----------
+    window : ndarray of int
+        Number of the quiet window.
+    time_ns : ndarray of int64
+        Mean time of the readings.
+    level_m : ndarray
+    sd_m : ndarray
+        Standard deviation of a reading about the mean.
+    count : ndarray of int
+    temperature_c : ndarray
+        nan: not measured.
+    water_m : ndarray
+        nan: not measured.
+    """
+
+    window: np.ndarray
+    time_ns: np.ndarray
+    level_m: np.ndarray
+    sd_m: np.ndarray
+    count: np.ndarray
+    temperature_c: np.ndarray
+    water_m: np.ndarray
+
+    def __len__(self):
+        """Number of pieces."""
+        return len(self.time_ns)
+
+    def select(self, rows):
+        """Pieces of an index or a mask."""
+        return Pieces(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+
+
+def divide_windows(windows):
+    """Divide windows (w, 2) into pieces of at most an hour: (pieces (p, 2), window (p,))."""
+    lengths = windows[:, 1] - windows[:, 0]
+    counts = np.maximum(np.ceil(lengths / PIECE_NS).astype(int), 1)
+    window = np.repeat(np.arange(len(windows)), counts)
+    number = np.arange(len(window)) - np.repeat(np.cumsum(counts) - counts, counts)
+    size = lengths[window] // counts[window]
+    starts = windows[window, 0] + number * size
+    return np.stack([starts, starts + size], axis=1), window
+
+
+class LevelSums:
+    """Sums of the readings of each piece of the quiet windows.
+
+    Parameters
+    ----------
+    windows : ndarray of int64, shape (w, 2)
+        Quiet windows in nanoseconds UTC.
+    quantum_m : float
+        Smallest step of the indication.
+    flows : sequence of flows.MeterFlow
+    area_m2 : callable
+        Area of the liquid surface at levels, for the movement that a stuck float has missed.
+    """
+
+    def __init__(self, windows, quantum_m, flows, area_m2):
+        self.pieces, self.window = divide_windows(windows)
+        self.quantum_m, self.flows, self.area_m2 = quantum_m, flows, area_m2
+        count = len(self.pieces)
+        self._reference = np.full(count, np.nan)
+        self._sums = {name: np.zeros(count) for name in ("n", "h", "hh", "t", "T", "nT", "w", "nw")}
+        self._stuck = []
+
+    def read(self, files):
+        """Add the rows of level logs, in order of their first time."""
+        for file in files:
+            recent = [np.zeros(0, dtype=np.int64), np.zeros(0)]
+            run, last = None, NOT_A_TIME
+            for chunk in file.chunks():
+                chunk = _separate_tags(chunk, file.profile)
+                time, level = chunk["time"], chunk["level"]
+                late = time < np.maximum.accumulate(np.append(last, time))[:-1]
+                file.findings.add("levels", "late", time[late])
+                last = max(last, int(time.max(initial=NOT_A_TIME)))
+                file.findings.add("levels", "row", time)
+                order = np.argsort(time, kind="stable")
+                chunk = {key: values[order] for key, values in chunk.items()}
+                time, level = chunk["time"], chunk["level"]
+                is_level = np.isfinite(level)
+                is_new = self._find_new_rows(time, level, is_level, recent, file)
+                recent = [np.append(old, new)[-OVERLAP:] for old, new in
+                          zip(recent, (time[is_level & is_new], level[is_level & is_new]),
+                              strict=True)]  # fmt: skip
+                run = self._follow_runs(time[is_level], level[is_level], run)
+                is_line = np.zeros(len(time), dtype=bool)
+                is_line[is_level] = find_lines(time[is_level], level[is_level])
+                file.findings.add("levels", "interpolated", time[is_line])
+                self._add(chunk, is_new & ~is_line)
+            self._follow_runs(None, None, run)
+
+    def _find_new_rows(self, time, level, is_level, recent, file):
+        """Mask (n,) of rows that do not repeat an earlier row; other values are problems."""
+        both = np.append(recent[0], time), np.append(recent[1], level)
+        order = np.argsort(both[0], kind="stable")
+        times, levels = both[0][order], both[1][order]
+        repeats = np.append(False, (np.diff(times) == 0) & np.isfinite(levels[1:]))
+        repeats &= np.append(False, np.isfinite(levels[:-1]))
+        is_other = repeats & np.append(False, levels[1:] != levels[:-1])
+        is_repeated = np.zeros(len(times), dtype=bool)
+        is_repeated[order] = repeats
+        file.findings.add("levels", "duplicate", times[repeats & ~is_other])
+        file.findings.add("levels", "other_value", times[is_other])
+        mask = ~is_repeated[len(recent[0]) :]
+        # Two values at a time: neither is used.
+        clash = np.isin(time, times[is_other])
+        return mask & ~(clash & is_level)
+
+    def _follow_runs(self, time, level, run):
+        """Record stuck floats: equal values while liquid was metered; the open run at the end.
+
+        A run is (start, end, value); time None closes the open run.
+        """
+        runs = [] if run is None else [run]
+        if time is not None and len(time):
+            edges = np.flatnonzero(np.diff(level) != 0) + 1
+            starts, ends = np.append(0, edges), np.append(edges, len(level)) - 1
+            new = [time[starts], time[ends], level[starts]]
+            if run is not None and run[2] == level[0]:
+                new[0] = new[0].copy()
+                new[0][0], runs = min(run[0], int(new[0][0])), []
+        else:
+            new = [np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0)]
+        start, end, value = (
+            np.append([entry[i] for entry in runs], new[i]) for i in range(3)
+        )  # fmt: skip
+        start, end = start.astype(np.int64), end.astype(np.int64)
+        closed = len(start) - (0 if time is None else 1)
+        flow = np.zeros(len(start))
+        for meter in self.flows:
+            flow += meter.volume_m3(end) - meter.volume_m3(start)
+        missed = STUCK_STEPS * max(self.quantum_m, 1e-4) * self.area_m2(value)
+        for place in np.flatnonzero(flow[:closed] > missed[:closed]):
+            self._stuck.append((int(start[place]), int(end[place])))
+        return None if time is None or not len(start) else (start[-1], end[-1], value[-1])
+
+    def _add(self, chunk, is_used):
+        """Add readings to the sums of their pieces."""
+        time = chunk["time"]
+        place = np.searchsorted(self.pieces[:, 0], time, side="right") - 1
+        is_used = is_used & (place >= 0)
+        is_used &= time <= self.pieces[np.maximum(place, 0), 1] if len(self.pieces) else False
+        count = len(self.pieces)
+
+        def add(name, rows, values):
+            self._sums[name] += np.bincount(place[rows], values, minlength=count)
+
+        rows = is_used & np.isfinite(chunk["level"])
+        level, at = chunk["level"][rows], place[rows]
+        is_first = np.isnan(self._reference[at])
+        first, index = np.unique(at[is_first], return_index=True)
+        self._reference[first] = level[is_first][index]
+        offset = level - self._reference[at]
+        add("n", rows, np.ones(len(level)))
+        add("h", rows, offset)
+        add("hh", rows, offset**2)
+        add("t", rows, (time[rows] - self.pieces[at, 0]) * 1e-9)
+        for name, column in (("T", "temperature"), ("w", "water")):
+            if column in chunk:
+                known = is_used & np.isfinite(chunk[column])
+                add(name, known, chunk[column][known])
+                add(f"n{name}", known, np.ones(known.sum()))
+
+    def means(self, findings):
+        """`Pieces` with at least two readings, without those of a stuck float."""
+        sums = self._sums
+        n = np.maximum(sums["n"], 1)
+        mean = sums["h"] / n
+        variance = np.maximum(sums["hh"] / n - mean**2, 0.0) * n / np.maximum(n - 1, 1)
+        is_stuck = np.zeros(len(n), dtype=bool)
+        for start, end in self._stuck:
+            touched = (self.pieces[:, 1] > start) & (self.pieces[:, 0] < end)
+            is_stuck |= touched
+            findings.add("levels", "stuck", (start, end), int(sums["n"][touched].sum()))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            temperature, water = sums["T"] / sums["nT"], sums["w"] / sums["nw"]
+        pieces = Pieces(
+            self.window, self.pieces[:, 0] + (sums["t"] / n * 1e9).astype(np.int64),
+            self._reference + mean, np.sqrt(variance), sums["n"].astype(int), temperature, water,
+        )  # fmt: skip
+        return pieces.select((sums["n"] >= 2) & ~is_stuck)
+
+
+def _separate_tags(chunk, profile):
+    """Chunk with a column for each tag, nan in the rows of other tags."""
+    if "tag" not in chunk:
+        return {"level": np.full(len(chunk["time"]), np.nan)} | chunk
+    values = chunk["value"].astype(float)
+    columns = {name: profile.to_si(name, np.where(chunk["tag"] == tag, values, np.nan))
+               for name, tag in profile.tags.items()}  # fmt: skip
+    return {"time": chunk["time"], "level": np.full(len(values), np.nan)} | columns
+
+
+def find_lines(time_ns, level_m):
+    """Whether each row (n,) lies inside a straight line of constant slope, an interpolation.
+
+    Parameters
+    ----------
+    time_ns : ndarray of int64, shape (n,)
+        Ascending.
+    level_m : ndarray, shape (n,)
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+    """
+    result = np.zeros(len(level_m), dtype=bool)
+    if len(level_m) < LINE_ROWS:
+        return result
+    seconds, rise = np.diff(time_ns) * 1e-9, np.diff(level_m)
+    slope = rise / np.maximum(seconds, 1e-9)
+    # Row i + 1 is on the line through its neighbours, which is not level.
+    is_inside = (np.abs((slope[1:] - slope[:-1]) * seconds[1:]) < LINE_M) & (rise[1:] != 0)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], is_inside, [0]])))
+    pairs = edges.reshape(-1, 2)
+    for start, end in pairs[pairs[:, 1] - pairs[:, 0] >= LINE_ROWS - 2]:
+        result[start + 1 : end + 1] = True
+    return result

@@ -1,0 +1,327 @@
+"""Rows of logs, read in chunks: CSV files by a profile, and captures of TLS consoles.
+
+A chunk is a mapping {column: values}. Numbers are in SI units, times are nanoseconds UTC. Only the
+columns of the profile are read. Rows that cannot be used are counted by kind, with the first and
+the last time; no value is corrected.
+"""
+
+import re
+import struct
+from collections import defaultdict
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+
+from tankcal.job.tables import Log, unreadable_file
+from tankcal.messages import message
+from tankcal.products.upkeep.clocks import NOT_A_TIME, LocalClock
+from tankcal.products.upkeep.profiles import KINDS, QUANTITIES, LogProfile
+
+CHUNK = 200_000  # rows
+MOST_BAD_ROWS = 3  # rows named in messages of a file
+MOST_CAPTURE_BYTES = 200_000_000
+TIMES = ("time", "begin", "end")
+TEXTS = ("tank", "meter", "ticket", "kind", "quality", "tag")
+HAS_OFFSET = re.compile(r"(?:Z|[+-]\d\d:?\d\d)$")
+# Block of a console: code, time, data, check sum. The control characters may be missing.
+TLS_BLOCK = re.compile(rb"(\x01?)i20([12])\d\d(\d{10})([^&]*)&&([0-9A-Fa-f]{4})")
+
+
+@dataclass
+class Findings:
+    """Rows of a log by kind, with their number and times.
+
+    Attributes
+    ----------
+    counts : dict
+        {(log, kind): [number, first time, last time]}, times in nanoseconds UTC or None.
+    """
+
+    counts: dict = field(default_factory=lambda: defaultdict(lambda: [0, None, None]))
+
+    def add(self, log, kind, times=(), count=None):
+        """Count rows of a kind, with their times (n,)."""
+        count = len(times) if count is None else count
+        if not count:
+            return
+        entry = self.counts[log, kind]
+        entry[0] += int(count)
+        known = np.asarray(times, dtype=np.int64)
+        known = known[known != NOT_A_TIME]
+        if len(known):
+            low, high = int(known.min()), int(known.max())
+            entry[1] = low if entry[1] is None else min(entry[1], low)
+            entry[2] = high if entry[2] is None else max(entry[2], high)
+
+    def number(self, log, kind):
+        """Number of rows of a kind."""
+        return self.counts[log, kind][0] if (log, kind) in self.counts else 0
+
+
+@dataclass
+class LogFile:
+    """A file of a log.
+
+    Attributes
+    ----------
+    path : Path
+    kind : str
+        A key of profiles.KINDS.
+    profile : LogProfile
+    zone : str
+        IANA name of the time zone of local times.
+    findings : Findings
+    log : Log
+        Receives problems.
+    """
+
+    path: object
+    kind: str
+    profile: LogProfile
+    zone: str
+    findings: Findings
+    log: Log
+
+    def chunks(self):
+        """Yield chunks {column: values (n,)}; "row" is the row in the file.
+
+        Rows without a valid time are left out.
+        """
+        try:
+            reader = self._csv if self.profile.format == "csv" else self._captures
+            yield from self._add_times(reader())
+        except (OSError, ValueError, pd.errors.ParserError) as error:
+            text = unreadable_file(error if isinstance(error, OSError) else OSError(str(error)))
+            self.log.problem(self.path.name, text)
+
+    def _csv(self):
+        """Yield chunks of texts of a CSV file: a data frame with the columns of the profile."""
+        options, columns = self.profile.file, self.profile.columns
+        names = list(options["headings"]) if options.get("headings") else None
+        skipped = int(options.get("skip_rows") or 0)
+        arguments = {
+            "sep": options.get("separator", ","), "encoding": options.get("encoding", "utf-8-sig"),
+            "skiprows": skipped, "na_values": list(options.get("missing", ())),
+            "decimal": options.get("decimal", "."), "skipinitialspace": True,
+        }  # fmt: skip
+        with open(self.path, encoding=arguments["encoding"], errors="replace") as stream:
+            first = [stream.readline() for _ in range(skipped + 1)][-1]
+        present = names or [name.strip() for name in first.strip().split(arguments["sep"])]
+        used = {heading: column for column, heading in columns.items() if heading in present}
+        for group in KINDS[self.kind]:
+            if not any(column in used.values() for column in group):
+                headings = [columns[column] for column in group if column in columns]
+                text = message("upkeep_no_column", "no column {headings}; the file has {present}",
+                               headings=", ".join(headings),
+                               present=", ".join(present)[:200])  # fmt: skip
+                self.log.problem(self.path.name, text, 1)
+                return
+        texts = [heading for heading, column in used.items() if column in (*TIMES, *TEXTS)]
+        frames = pd.read_csv(
+            self.path, names=names, header=None if names else 0, usecols=list(used),
+            dtype=dict.fromkeys(texts, str), chunksize=CHUNK, on_bad_lines="error", **arguments,
+        )  # fmt: skip
+        row = skipped + (1 if names else 2)
+        for frame in frames:
+            frame = frame.rename(columns=lambda heading: used[heading.strip()])
+            if names is None and len(frame) and frame["time"].iloc[0] == columns["time"]:
+                frame = frame.iloc[1:]  # the heading again, such as in joined files
+            yield row, self._numbers(frame)
+            row += len(frame)
+
+    def _numbers(self, frame):
+        """{column: values} with numbers in SI; words in place of numbers are nan, and counted."""
+        decimal = self.profile.file.get("decimal", ".")
+        result = {}
+        for column in frame:
+            values = frame[column]
+            if column in TIMES or column in TEXTS:
+                result[column] = values.to_numpy(dtype=object)
+                continue
+            if not pd.api.types.is_numeric_dtype(values):
+                words = values.astype(str).str.strip().str.replace(decimal, ".", regex=False)
+                numbers = pd.to_numeric(words, errors="coerce")
+                is_word = (numbers.isna() & values.notna()).to_numpy()
+                self.findings.add(self.kind, "not_a_number", count=int(is_word.sum()))
+                values = numbers
+            result[column] = self.profile.to_si(column, values.to_numpy(dtype=float))
+        return result
+
+    def _captures(self):
+        """Yield the blocks of a TLS capture as a chunk; a wrong check sum leaves a block out."""
+        data = self.path.read_bytes()
+        if len(data) > MOST_CAPTURE_BYTES:
+            text = message("upkeep_capture_too_large", "{size:.0f} MB; expected at most "
+                           "{most:.0f} MB", size=len(data) / 1e6,
+                           most=MOST_CAPTURE_BYTES / 1e6)  # fmt: skip
+            self.log.problem(self.path.name, text)
+            return
+        is_inventory = self.profile.format == "tls-inventory"
+        rows, blocks = [], 0
+        for block in TLS_BLOCK.finditer(data):
+            if block[2] != (b"1" if is_inventory else b"2"):
+                continue
+            blocks += 1
+            # The sum of all characters up to && and of the check sum is 0 modulo 65536. The first
+            # character, SOH (1), belongs to the sum even if the capture has lost it.
+            total = sum(block[0][:-4]) + (0 if block[1] else 1) + int(block[5], 16)
+            if total % 65536:
+                self.findings.add(self.kind, "wrong_check_sum", count=1)
+                continue
+            read = read_inventory if is_inventory else read_deliveries
+            rows += read(block[3].decode(), "".join(block[4].decode("latin-1").split()))
+        if not blocks:
+            text = message("upkeep_no_block", "no block of this format; expected a capture of the "
+                           "computer format {code}",
+                           code="i201" if is_inventory else "i202")  # fmt: skip
+            self.log.problem(self.path.name, text)
+        frame = pd.DataFrame(rows)
+        if len(frame):
+            texts = (*TIMES, *TEXTS)
+            yield (
+                1,
+                {
+                    column: frame[column].to_numpy(dtype=object)
+                    if column in texts
+                    else self.profile.to_si(column, frame[column].to_numpy(dtype=float))
+                    for column in frame
+                    if column in QUANTITIES
+                },
+            )
+
+    def _add_times(self, chunks):
+        """Chunks with times in UTC, of the selected tank and without rows of bad quality."""
+        clock, held = LocalClock(self.zone), None
+        for first_row, chunk in chunks:
+            count = len(chunk["time"])
+            chunk["row"] = first_row + np.arange(count)
+            for name, words in (("tank", self.profile.only.get("tank")),
+                                ("quality", self.profile.file.get("good"))):  # fmt: skip
+                if words and name in chunk:
+                    words = (words,) if isinstance(words, str) else words
+                    texts = pd.Series(chunk[name]).astype(str).str.strip()
+                    is_kept = texts.isin(words).to_numpy()
+                    if name == "quality":
+                        self.findings.add(self.kind, "bad_quality", count=int((~is_kept).sum()))
+                    chunk = {key: values[is_kept] for key, values in chunk.items()}
+            if held is not None:
+                chunk = {key: np.concatenate([held[key], chunk[key]]) for key in chunk}
+                held = None
+            local, is_local = self._parse_times(chunk["time"])
+            if is_local and count == CHUNK and len(local):
+                # A doubled hour that the chunk cuts is resolved with the next chunk.
+                doubled = clock.is_doubled(local)
+                last = int(np.argmin(doubled[::-1])) if not doubled.all() else len(local)
+                if last:
+                    cut = len(local) - last
+                    held = {key: values[cut:] for key, values in chunk.items()}
+                    chunk = {key: values[:cut] for key, values in chunk.items()}
+                    local = local[:cut]
+            yield from self._finish(chunk, local, is_local, clock)
+        if held is not None:
+            local, is_local = self._parse_times(held["time"])
+            yield from self._finish(held, local, is_local, clock)
+        self.findings.add(self.kind, "doubled_hour", count=clock.unresolved)
+
+    def _finish(self, chunk, local, is_local, clock):
+        """Yield the chunk with UTC times, without the rows that have none."""
+        times = {"time": local}
+        times |= {name: self._parse_times(chunk[name])[0] for name in TIMES[1:] if name in chunk}
+        for name, values in times.items():
+            utc, is_impossible = (
+                clock.convert(values) if is_local else (values, np.zeros(len(values), dtype=bool))
+            )
+            for place in np.flatnonzero(is_impossible)[:MOST_BAD_ROWS]:
+                text = message("upkeep_skipped_hour", "found {time}, in an hour that {zone} skips; "
+                               "expected a local time, or the right time zone",
+                               time=str(chunk[name][place]), zone=self.zone)  # fmt: skip
+                self.log.problem(self.path.name, text, int(chunk["row"][place]), name)
+            times[name] = utc
+        is_unread = times["time"] == NOT_A_TIME
+        self.findings.add(
+            self.kind, "no_time", count=int((is_unread & (local == NOT_A_TIME)).sum())
+        )
+        yield {key: values[~is_unread] for key, values in (chunk | times).items()}
+
+    def _parse_times(self, texts):
+        """(nanoseconds (n,), whether they are local) of texts."""
+        if len(texts) == 0:
+            return np.zeros(0, dtype=np.int64), True
+        known = next((text for text in texts if isinstance(text, str)), "")
+        has_offset = bool(HAS_OFFSET.search(known.strip()))
+        layout = self.profile.file.get("time_format")
+        parsed = pd.to_datetime(
+            pd.Series(texts, dtype=object), format=layout or "ISO8601", errors="coerce",
+            utc=has_offset,
+        )  # fmt: skip
+        values = parsed.to_numpy(dtype="datetime64[ns]").astype(np.int64)
+        return values, not has_offset
+
+
+def read_inventory(stamp, data):
+    """Rows of an i201 block: tank, product, status, count, then floats of 8 hex digits.
+
+    Parameters
+    ----------
+    stamp : str
+        yymmddHHMM of the console.
+    data : str
+        Records of the tanks, without spaces.
+
+    Returns
+    -------
+    list of dict
+    """
+    rows, place, time = [], 0, console_time(stamp)
+    while place + 9 <= len(data):
+        tank, count = data[place : place + 2], int(data[place + 7 : place + 9], 16)
+        values = read_floats(data[place + 9 : place + 9 + 8 * count])
+        place += 9 + 8 * count
+        names = ("volume", "corrected", "ullage", "level", "water", "temperature")
+        rows.append(
+            {"time": time, "tank": str(int(tank)), **dict(zip(names, values, strict=False))}
+        )
+    return rows
+
+
+def read_deliveries(stamp, data):
+    """Rows of an i202 block: for each delivery its begin, end, and volumes before and after.
+
+    Parameters
+    ----------
+    stamp : str
+        yymmddHHMM of the console; the deliveries have times of their own.
+    data : str
+        Records of the tanks, without spaces.
+
+    Returns
+    -------
+    list of dict
+    """
+    rows, place = [], 0
+    while place + 5 <= len(data):
+        tank, number = str(int(data[place : place + 2])), int(data[place + 3 : place + 5])
+        place += 5
+        for _ in range(number):
+            begin, end = data[place : place + 10], data[place + 10 : place + 20]
+            count = int(data[place + 20 : place + 22], 16)
+            values = read_floats(data[place + 22 : place + 22 + 8 * count])
+            place += 22 + 8 * count
+            rows.append(
+                {"time": console_time(end), "begin": console_time(begin), "tank": tank,
+                 "start_volume": values[0], "end_volume": values[4],
+                 "volume": values[4] - values[0]}
+            )  # fmt: skip
+    return rows
+
+
+def read_floats(text):
+    """Numbers of IEEE floats of 8 hex digits each."""
+    return [struct.unpack(">f", bytes.fromhex(text[i : i + 8]))[0] for i in range(0, len(text), 8)]
+
+
+def console_time(stamp):
+    """ISO time of yymmddHHMM; years 80 to 99 are of the last century."""
+    century = "19" if stamp[:2] >= "80" else "20"
+    return f"{century}{stamp[:2]}-{stamp[2:4]}-{stamp[4:6]}T{stamp[6:8]}:{stamp[8:10]}:00"

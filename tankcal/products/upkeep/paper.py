@@ -1,0 +1,336 @@
+"""Document of an upkeep: upkeep.json, CSV files, workbook and report."""
+
+from typing import ClassVar
+
+from matplotlib.figure import Figure
+
+from tankcal.messages import message
+from tankcal.products.upkeep.saved import UPKEEP
+from tankcal.report import blocks
+from tankcal.report.plain import words_with_part
+from tankcal.report.plots.style import GREY, INK, RED, WIDTH, styled
+from tankcal.report.saved_document import SavedDocument, SavedPaper, bearable
+from tankcal.report.tables import Column, Table
+from tankcal.text.digits import format_with_u, shortest
+from tankcal.text.shipped import DEFAULT
+from tankcal.text.words import load_words
+
+_SHOWN = {"sheet": True, "width": 12}
+_SPACE = "\N{NO-BREAK SPACE}"
+FILE, WORKBOOK = "upkeep.json", "upkeep.xlsx"
+DIGEST = 12  # printed digits of a SHA-256
+ROWS_SHOWN = 24  # rows of the table in the report
+SMALLEST_W = 2.5  # |w| of a printed suspect, unless it is possible
+
+
+def _number(name, u=None, unit="", **more):
+    """Column of numbers with the digits of an uncertainty."""
+    return Column(name, unit, u=u, csv=name, least=1, **_SHOWN, **more)
+
+
+def _plain(name, decimals, unit="", **more):
+    return Column(name, unit, decimals=decimals, csv=name, **_SHOWN, **more)
+
+
+def _text(name, width=18, **more):
+    return Column(name, text=lambda paper, row: bearable(str(row[name] or "")), csv=name,
+                  sheet=True, width=width, **more)  # fmt: skip
+
+
+ROWS = Table(
+    "upkeep_rows",
+    (
+        _plain("height_m", 3, "m"),
+        _number("former_m3", "former_U_m3", "m3"),
+        _number("former_U_m3", "former_U_m3", "m3"),
+        _number("volume_m3", "U_m3", "m3"),
+        _number("U_m3", "U_m3", "m3"),
+        _plain("En", 2),
+        Column("is_seen", words="seen", csv="is_seen", sheet=True, width=16),
+    ),
+    rows=lambda upkeep: upkeep["rows"],
+)
+DELIVERIES = Table(
+    "upkeep_deliveries",
+    (
+        _plain("low_m", 3, "m"),
+        _plain("high_m", 3, "m"),
+        _number("former_m3", "former_U_m3", "m3"),
+        _number("former_U_m3", "former_U_m3", "m3"),
+        _number("volume_m3", "U_m3", "m3"),
+        _number("U_m3", "U_m3", "m3"),
+    ),
+    rows=lambda upkeep: upkeep["deliveries"],
+)
+METERS = Table(
+    "upkeep_meters",
+    (
+        _text("name", 12),
+        _plain("volume_m3", 1, "m3"),
+        Column("certificate", text=lambda paper, row: paper.word(
+            "texts.traceable" if row["certificate"] else "texts.untraceable"),
+            csv="certificate", sheet=True, width=16),
+        _number("prior_percent", "prior_percent"),
+        _number("deviation_percent", "U_percent"),
+        _number("U_percent", "U_percent"),
+        _plain("correlation", 2),
+    ),
+    rows=lambda upkeep: upkeep["meters"],
+)  # fmt: skip
+MONTHS = Table(
+    "upkeep_months",
+    (
+        _text("month", 10),
+        _plain("steps", 0),
+        _number("leak_l_h", "U_l_h"),
+        _number("U_l_h", "U_l_h"),
+        _plain("detectable_l_h", 3),
+        Column("verdict", words="verdicts", csv="verdict", sheet=True, width=14),
+        _number("throughput_percent", "U_percent"),
+        _number("U_percent", "U_percent"),
+    ),
+    rows=lambda upkeep: upkeep["months"],
+)
+SUSPECTS = Table(
+    "upkeep_suspects",
+    (
+        Column("kind", words="kinds", csv="kind", sheet=True, width=36),
+        _text("member", 10),
+        _text("day", 12),
+        _number("size", "sd"),
+        _number("sd", "sd"),
+        _text("unit", 8),
+        _plain("w", 1),
+        Column("is_possible", words="possible", csv="is_possible", sheet=True, width=12),
+    ),
+    rows=lambda upkeep: [
+        row for row in upkeep["watch"]["suspects"]
+        if row["is_possible"] or abs(row["w"]) > SMALLEST_W
+    ],
+)  # fmt: skip
+CLEANING = Table(
+    "upkeep_cleaning",
+    (
+        Column("log", words="logs", csv="log", sheet=True, width=14),
+        Column("kind", words="findings", csv="kind", sheet=True, width=44),
+        _plain("count", 0),
+        _text("first", 16),
+        _text("last", 16),
+    ),
+    rows=lambda upkeep: [row for row in (*upkeep["cleaning"], *upkeep["left_out"]) if row["count"]],
+)
+CAUSES = Table(
+    "upkeep_causes",
+    (
+        _text("name", 28),
+        _text("unit", 8),
+        _plain("mean", 3),
+        _plain("prior_u", 3),
+        _number("estimate", "u"),
+        _number("u", "u"),
+    ),
+    rows=lambda upkeep: upkeep["causes"],
+)
+FILES = {
+    "table.csv": ROWS, "deliveries.csv": DELIVERIES, "meters.csv": METERS, "months.csv": MONTHS,
+    "alarms.csv": SUSPECTS, "cleaning.csv": CLEANING, "causes.csv": CAUSES,
+}  # fmt: skip
+
+
+class UpkeepPaper(SavedPaper):
+    """Formatter of a `saved.UpkeepFile` in a language.
+
+    Parameters
+    ----------
+    upkeep : dict
+        Plain data; checked against its schema.
+    language : str, optional
+        A value of languages.LANGUAGES; None: English.
+    letterhead : letterhead.Letterhead, optional
+        Letterhead of the laboratory.
+    """
+
+    kind, file = "upkeep", FILE
+    attached: ClassVar[dict] = {FILE: "upkeep", WORKBOOK: "upkeep_workbook"}
+
+    def __init__(self, upkeep, language=None, letterhead=None):
+        super().__init__(words_with_part(load_words(language or DEFAULT), "upkeep"))
+        self.saved = self.record = UPKEEP.migrated(upkeep, UPKEEP.file)
+        self.letterhead = letterhead.data() if letterhead else None
+
+    def subject(self):
+        """Name of the tank."""
+        return bearable(f"{self.word('page.tank')} {self.record['tank']}")
+
+    def date(self):
+        """Last day of the logs."""
+        return self.record["period"]["last"]
+
+    def with_u(self, value, U, unit):
+        """A value with its U and unit."""
+        written = format_with_u(value, U, self.marks)
+        return f"{written.value}{_SPACE}{unit} ± {written.uncertainty}{_SPACE}{unit}"
+
+    def result(self):
+        """Sentence of the main result: the delivery over the levels of the steps."""
+        last = self.record["deliveries"][-1]
+        return self.word(
+            f"texts.result_{self.record['mode']}",
+            low=self.height(round(last["low_m"], 3)), high=self.height(round(last["high_m"], 3)),
+            volume=self.with_u(last["volume_m3"], last["U_m3"], "m³"),
+            former=self.with_u(last["former_m3"], last["former_U_m3"], "m³"),
+            steps=self.record["period"]["used"],
+        )  # fmt: skip
+
+    def reasons(self):
+        """Reasons why results are not stated."""
+        return [self.words["reasons"][reason] for reason in self.record["reasons"]]
+
+    def alarm(self):
+        """Sentence of the watching."""
+        watch = self.record["watch"]
+        numbers = {
+            "largest": self.number(watch["largest"], decimals=1),
+            "limit": self.number(watch["limit"], decimals=1),
+            "rate": shortest(watch["rate_per_year"], self.marks),
+        }
+        if watch["alarm"] is None:
+            text = self.word("texts.no_alarm", **numbers)
+        else:
+            possible = [row for row in watch["suspects"] if row["is_possible"]]
+            names = ", ".join(dict.fromkeys(
+                self.words["kinds"][row["kind"]]
+                + (f" {bearable(row['member'])}" if row["member"] else "")
+                for row in possible))  # fmt: skip
+            code = "alarm_named" if watch["is_named"] else "alarm_open"
+            text = self.word(f"texts.{code}", day=self.day(watch["alarm"]), names=names, **numbers)
+        if watch["is_provisional"]:
+            text = f"{text} {self.word('texts.provisional')}"
+        return text
+
+
+def pages(paper, folder=None, whole=False):
+    """Blocks of the report of an `UpkeepPaper`."""
+    upkeep = paper.record
+    return [
+        *paper.head(folder),
+        paper.facts(_facts(paper)),
+        blocks.paragraph(paper.result()),
+        *([blocks.listing(paper.reasons())] if upkeep["reasons"] else []),
+        blocks.paragraph(paper.alarm()),
+        paper.show(DELIVERIES),
+        blocks.whole(paper.show(METERS)),
+        paper.paragraph("throughput"),
+        paper.figure(plot_months(paper), "upkeep_leak"),
+        paper.show(MONTHS),
+        *([paper.show(SUSPECTS)] if SUSPECTS.rows(upkeep) else []),
+        *([_table(paper)] if upkeep["rows"] else []),
+        paper.show(CLEANING),
+        paper.heading("remarks"),
+        blocks.listing(_remarks(paper)),
+    ]
+
+
+def _table(paper):
+    """Table of the report: every n-th row."""
+    rows = paper.record["rows"]
+    return paper.show(ROWS, rows[:: max(len(rows) // ROWS_SHOWN, 1)])
+
+
+def _facts(paper):
+    """Facts of the upkeep."""
+    upkeep = paper.record
+    period = upkeep["period"]
+    return [
+        ("site", upkeep["site"] and bearable(upkeep["site"])),
+        ("by", upkeep["by"] and bearable(upkeep["by"])),
+        ("period", paper.word("texts.span", first=paper.day(period["first"]),
+                              last=paper.day(period["last"]))),
+        ("liquid", upkeep["liquid"] and bearable(upkeep["liquid"])),
+        ("steps", paper.word("texts.steps", used=period["used"], steps=period["steps"],
+                             rejected=period["rejected"])),
+        ("range", paper.word("texts.range", low=paper.height(round(period["lowest_m"], 3)),
+                             high=paper.height(round(period["highest_m"], 3)))),
+        ("sold", paper.number(period["sold_m3"], "m3", decimals=1)),
+        ("delivered", paper.number(period["delivered_m3"], "m3", decimals=1)),
+        ("chi2", paper.word("texts.chi2", chi2=paper.number(upkeep["fit"]["chi2"], decimals=0),
+                            dof=upkeep["fit"]["dof"])),
+        ("note", upkeep["note"] and bearable(upkeep["note"])),
+    ]  # fmt: skip
+
+
+def _remarks(paper):
+    """Warnings, standing statements and input files."""
+    upkeep = paper.record
+    texts = [paper.warning(warning) for warning in upkeep["warnings"]]
+    texts += paper.words["standing"].values()
+    files = ", ".join(f"{item['file']} {item['sha256'][:DIGEST]}" for item in upkeep["files"])
+    texts.append(paper.word("texts.inputs", files=bearable(files)))
+    return texts
+
+
+@styled
+def plot_months(paper):
+    """Draw the leak rate of each month with U (matplotlib Figure)."""
+    months = paper.record["months"]
+    figure = Figure(figsize=(WIDTH, 1.9))
+    ax = figure.add_subplot()
+    places = range(len(months))
+    for place, month in zip(places, months, strict=True):
+        colour = RED if month["verdict"] == "fail" else INK
+        ax.errorbar(place, month["leak_l_h"], yerr=month["U_l_h"], color=colour, marker="o",
+                    markersize=3, capsize=2, linewidth=0.9)  # fmt: skip
+    ax.axhline(0, color=GREY, linewidth=0.7)
+    step = max(len(months) // 12, 1)
+    ax.set_xticks(list(places)[::step], [month["month"] for month in months][::step])
+    ax.set_ylabel(paper.word("texts.leak_axis"))
+    return figure
+
+
+def write_workbook(paper, path):
+    """Write the workbook of an `UpkeepPaper`; equal data give equal bytes."""
+    from tankcal.report.workbook.book import workbook_head
+    from tankcal.report.workbook.sections import write_workbook as write
+
+    upkeep = paper.record
+    head = workbook_head(
+        upkeep["tankcal"], tank=upkeep["tank"], date=paper.date(), notice=upkeep["notice"],
+        laboratory=paper.letterhead["name"] if paper.letterhead else "",
+    )  # fmt: skip
+    write(paper, path, "upkeep", head, _sheets)
+
+
+def _sheets(book):
+    """Yield the content of each sheet, in order."""
+    from tankcal.report.workbook.sections import Facts, Sentences, SheetContent, cell_table
+
+    paper = book.paper
+    facts = [(paper.label(key), value, None) for key, value in _facts(paper) if value]
+    parts = [
+        Facts(facts),
+        Sentences([paper.result(), *paper.reasons(), paper.alarm()]),
+        Sentences(_remarks(paper), title=paper.words["headings"]["remarks"]),
+    ]
+    yield SheetContent("upkeep_result", parts, landscape=False, widths=(42, 58))
+    for table in (ROWS, DELIVERIES, METERS, MONTHS, SUSPECTS, CLEANING, CAUSES):
+        if table.rows(paper.record):
+            yield SheetContent(table.name, [cell_table(book, table)], tab="result")
+
+
+DOCUMENT = SavedDocument(
+    UPKEEP,
+    UpkeepPaper,
+    lambda: (pages, write_workbook),
+    steps=(
+        message("upkeep_tables", "writing the tables of the upkeep"),
+        message("upkeep_papers", "setting the report of the upkeep"),
+    ),
+    unreadable=lambda error: message(
+        "upkeep_unreadable", "cannot be read as an upkeep: {error}", error=error
+    ),
+    without_content=lambda what: message(
+        "no_upkeep", "does not have the content of an upkeep ({what})", what=what
+    ),
+    tables=FILES,
+    has_page=False,
+)

@@ -1,0 +1,379 @@
+"""Reading of an upkeep: upkeep.toml, meters.csv, the logs and the record of the tank."""
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
+
+import numpy as np
+
+from tankcal.errors import InputError, Problem
+from tankcal.job.contract.keys import CSV
+from tankcal.job.contract.shorthand import choice, number, positive
+from tankcal.job.entries import read_columns
+from tankcal.job.fields import Field
+from tankcal.job.folder import read_csv
+from tankcal.job.tables import Log, read_bytes, shown
+from tankcal.messages import message
+from tankcal.products.quantity.table import read_table
+from tankcal.products.settings import fill_blanks, read_sections
+from tankcal.products.upkeep.causes import PRIORS, Meter, Operation, TableStock
+from tankcal.products.upkeep.flows import quiet_windows, read_flows
+from tankcal.products.upkeep.levels import LevelSums
+from tankcal.products.upkeep.logs import Findings, LogFile
+from tankcal.products.upkeep.profiles import read_log_profile
+from tankcal.products.upkeep.steps import REASONS, StepRules, Tickets, build_steps
+from tankcal.record.manifest import digest_of
+from tankcal.text.shipped import LANGUAGES
+
+SETTINGS, METERS = "upkeep.toml", "meters.csv"
+EVENTS = (
+    "proving", "adjusted", "gauge_set", "dip", "water_drawn", "product_changed", "opened",
+    "repaired", "clock_set", "table_changed",
+)  # fmt: skip
+BROKEN_BY = {  # events that no step may contain
+    "gauge_set": "adjusted", "water_drawn": "water_drawn", "product_changed": "adjusted",
+    "opened": "adjusted", "repaired": "adjusted", "table_changed": "adjusted",
+}  # fmt: skip
+SERVICES = {  # settle_s, rest_h, least_delivery_m3, noise_mm if upkeep.toml declares none
+    "station": {"settle_s": 120.0, "rest_h": 2.0, "least_delivery_m3": 0.3, "noise_mm": 0.3},
+    "terminal": {"settle_s": 1800.0, "rest_h": 12.0, "least_delivery_m3": 10.0, "noise_mm": 1.0},
+}
+UNUSED_WARNED, UNUSED_REFUSED = 0.05, 0.30  # share of the readings of a level log
+
+
+def _files(kind):
+    """Keys of the section of a log."""
+    return (
+        Field("files", "names", "names of the files, or patterns such as levels-*.csv"),
+        Field("profile", "text", "shipped profile, or a TOML file in the folder"),
+        *((Field("net", "flag", "volumes are at the base temperature"),)
+          if kind in ("meters", "deliveries") else ()),
+    )  # fmt: skip
+
+
+SECTIONS = {
+    "upkeep": (
+        Field("record", "text", "record.json of the tank, or its folder", required=True),
+        Field("timezone", "text", "IANA name of local times", required=True),
+        choice("service", "", tuple(SERVICES), required=True),
+        choice("language", "", LANGUAGES),
+        number("coverage_probability", "", 0.5, 0.9999),
+        *(Field(name, "text", "") for name in ("site", "by", "note", "notice")),
+    ),
+    "liquid": (
+        Field("name", "text", ""),
+        number("expansion_per_k", "cubic", 0, 0.01, required=True),
+        number("base_c", "base temperature", -20, 60, required=True),
+    ),
+    "gauge": (
+        positive("resolution_mm", "smallest step of the indication", 100, required=True),
+        positive("noise_mm", "standard deviation of a reading", 20),
+        positive("settle_s", "after a flow", 1e5),
+        positive("rest_h", "after a delivery", 200),
+        positive("least_delivery_m3", "", 1e4),
+    ),
+    **{kind: _files(kind) for kind in ("levels", "meters", "deliveries", "events", "air")},
+    "priors": tuple(number(name, "", 0, 1e6) for name in PRIORS["station"]),
+    "watch": (number("false_alarm_per_year", "", 0.001, 1.0),),
+    "csv": CSV,
+}
+METER_COLUMNS = (
+    Field("meter", "name", "", required=True),
+    positive("factor", "", 2),
+    positive("u_factor_ppm", "", 1e5),
+    number("walk_ppm", "per root of a year", 0, 1e5),
+    number("wear_ppm", "per year", -1e5, 1e5),
+    number("u_wear_ppm", "per year", 0, 1e5),
+    Field("certificate", "text", ""),
+)
+
+
+@dataclass(frozen=True)
+class LogSource:
+    """File of a log: kind, name, SHA-256, number of rows, first and last time."""
+
+    kind: str
+    file: str
+    sha256: str
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Checked input of an upkeep.
+
+    Attributes
+    ----------
+    sections : dict
+        {section: {key: value}} of upkeep.toml.
+    operation : causes.Operation
+    steps : steps.Steps
+    findings : logs.Findings
+    sources : tuple of LogSource
+        Files in the order of reading; the first two are upkeep.toml and record.json.
+    pieces : int
+        Number of quiet pieces.
+    traceable : tuple of str
+        Meters with a certificate.
+    warnings : tuple of Problem
+    """
+
+    sections: dict
+    operation: Operation
+    steps: object
+    findings: Findings
+    sources: tuple
+    pieces: int
+    traceable: tuple
+    warnings: tuple
+
+    @property
+    def table(self):
+        """Capacity table in force."""
+        return self.operation.stock.table
+
+
+def read_upkeep(folder):
+    """Read the settings and all logs of a tank, clean them and build its steps.
+
+    Parameters
+    ----------
+    folder : path
+        Folder with upkeep.toml, or its upkeep.toml.
+
+    Returns
+    -------
+    Inputs
+
+    Raises
+    ------
+    InputError
+        With every problem of the files.
+    """
+    folder, log = Path(folder).absolute(), Log()
+    settings = folder if folder.suffix == ".toml" else folder / SETTINGS
+    folder = settings.parent
+    if not settings.is_file():
+        text = message("upkeep_no_settings", "no {file}; expected it in this folder: tankcal "
+                       "upkeep {name} --new writes empty input files", file=settings.name,
+                       name=folder.name)  # fmt: skip
+        raise InputError(Problem(folder.name, text))
+    sections, places, marks = read_sections(settings, SECTIONS, log)
+
+    def tell(key, text):
+        log.problem(settings.name, text, places.get(key), key)
+
+    zone = sections["upkeep"]["timezone"]
+    try:
+        ZoneInfo(zone or "UTC")
+    except (ZoneInfoNotFoundError, ValueError):
+        tell("upkeep.timezone", message("upkeep_zone", "no time zone {name}; expected an IANA name "
+             "such as America/Sao_Paulo", name=shown(zone)))  # fmt: skip
+    for kind in ("levels", "meters"):
+        if not sections[kind]["files"]:
+            tell(f"{kind}.files", message("upkeep_no_files", "missing; expected the files of the "
+                 "log"))  # fmt: skip
+    log.stop_if_problems()
+    path = folder / sections["upkeep"]["record"]
+    path = path / "record.json" if path.is_dir() else path
+    if not path.is_file():
+        tell("upkeep.record", message("upkeep_no_record", "found {name}, where no record is; "
+             "expected record.json of the tank, or its folder",
+             name=shown(sections["upkeep"]["record"])))  # fmt: skip
+    log.stop_if_problems()
+    table = read_table(path)
+    findings, sources = Findings(), [
+        LogSource("settings", settings.name, digest_of(settings)),
+        LogSource("record", path.name, table.digest),
+    ]  # fmt: skip
+    files = {
+        kind: _log_files(kind, sections, folder, zone, findings, log, sources)
+        for kind in ("events", "meters", "deliveries", "air", "levels")
+    }
+    meters = _read_meters(folder, marks, log, sources)
+    log.stop_if_problems()
+    return _build(sections, table, meters, files, findings, sources, log)
+
+
+def _log_files(kind, sections, folder, zone, findings, log, sources):
+    """`LogFile`s of a section, in the order of their names; a file that comes twice is refused."""
+    section, files = sections[kind], []
+    if not section["files"]:
+        return []
+    profile = read_log_profile(section["profile"], kind, folder, log)
+    for pattern in section["files"]:
+        paths = sorted(folder.glob(pattern)) if set(pattern) & set("*?[") else [folder / pattern]
+        if not paths or not all(path.is_file() for path in paths):
+            text = message("upkeep_no_file", "no file {name}; expected a file in the folder",
+                           name=shown(pattern))  # fmt: skip
+            log.problem(SETTINGS, text, None, f"{kind}.files")
+            continue
+        for path in paths:
+            digest = hash_file(path)
+            twin = next((source.file for source in sources if source.sha256 == digest), None)
+            if twin is not None:
+                text = message("upkeep_file_twice", "content equal to that of {twin}; expected "
+                               "each log once: it would count twice", twin=twin)  # fmt: skip
+                log.problem(path.name, text)
+                continue
+            sources.append(LogSource(kind, path.name, digest))
+            files.append(LogFile(path, kind, profile, zone, findings, log))
+    return files if profile is not None else []
+
+
+def hash_file(path):
+    """SHA-256 of a file, read in pieces."""
+    with open(path, "rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def _read_meters(folder, marks, log, sources):
+    """{name: (`Meter`, certificate or None)} of meters.csv; empty without the file."""
+    path = folder / METERS
+    if not path.is_file():
+        return {}
+    data = read_bytes(path, log)
+    raw = None if data is None else read_csv(METERS, data, *marks, log, SETTINGS)
+    table = None if raw is None else read_columns(None, raw, log, METER_COLUMNS)
+    if table is None:
+        return {}
+    sources.append(LogSource("settings", METERS, hash_file(path)))
+
+    def ppm(row, name):
+        value = row[name]
+        return None if value is None or np.isnan(value) else 1e-6 * value
+
+    meters = {}
+    for row in table.records():
+        factor = row["factor"]
+        has_factor = factor is not None and not np.isnan(factor)
+        meter = Meter(row["meter"], factor if has_factor else 1.0, ppm(row, "u_factor_ppm"),
+                      ppm(row, "walk_ppm"), ppm(row, "wear_ppm"), ppm(row,
+                      "u_wear_ppm"))  # fmt: skip
+        meters[row["meter"]] = meter, row["certificate"] or None
+    return meters
+
+
+def _build(sections, table, meters, files, findings, sources, log):
+    """`Inputs` of the opened files."""
+    service = sections["upkeep"]["service"]
+    rules = fill_blanks(sections["gauge"], SERVICES[service])
+    quantum = sections["gauge"]["resolution_mm"] / 1000
+    priors = fill_blanks(sections["priors"], PRIORS[service])
+    events = _read_events(files["events"], log)
+    adjusted = [(event["meter"], event["time"]) for event in events if event["kind"] == "adjusted"]
+    flows = read_flows(files["meters"], adjusted)
+    tickets = _read_tickets(files["deliveries"], findings)
+    air = _read_air(files["air"])
+    log.stop_if_problems()
+    if not flows or not any(len(flow.time_ns) for flow in flows):
+        text = message("upkeep_no_flow", "no metered volume; expected sales or receipts")
+        raise InputError(Problem(files["meters"][0].path.name, text))
+    span = 400 * 86400 * 10**9
+    first = min(flow.begin_ns.min() for flow in flows if len(flow.time_ns)) - span
+    last = max(flow.time_ns.max() for flow in flows if len(flow.time_ns)) + span
+    windows = quiet_windows(flows, rules["settle_s"], first, last)
+
+    def area_m2(level):
+        return (table.volume(level + 1e-3) - table.volume(level - 1e-3)) / 2e-3
+
+    sums = LevelSums(windows, quantum, flows, area_m2)
+    sums.read(files["levels"])
+    log.stop_if_problems()
+    pieces = sums.means(findings)
+    inside = ~table.is_outside(pieces.level_m)
+    findings.add("levels", "outside_table", pieces.time_ns[~inside], pieces.count[~inside].sum())
+    pieces = pieces.select(inside)
+    rules = StepRules(quantum, rules["noise_mm"] / 1000, rules["rest_h"],
+                      rules["least_delivery_m3"], float(np.ptp(table.height_m)))  # fmt: skip
+    broken = [(event["time"], REASONS.index(BROKEN_BY[event["kind"]]))
+              for event in events if event["kind"] in BROKEN_BY]  # fmt: skip
+    steps = build_steps(pieces, flows, tickets, table.volume, rules, findings, broken)
+    if not len(steps):
+        text = message("upkeep_no_steps", "no step between two quiet levels; expected levels "
+                       "before and after sales, in a common time zone")  # fmt: skip
+        raise InputError(Problem(files["levels"][0].path.name, text))
+    _judge_cleaning(findings, files["levels"][0].path.name, log)
+    log.stop_if_problems()
+    operation = Operation(
+        TableStock(table, sections["liquid"]["expansion_per_k"], sections["liquid"]["base_c"]),
+        {name: meter for name, (meter, _) in meters.items()}, priors, air,
+        {kind: bool(sections[kind]["net"]) for kind in ("meters", "deliveries")},
+        int(steps.marks.time_ns[0]),
+    )  # fmt: skip
+    traceable = tuple(name for name, (_, certificate) in meters.items() if certificate)
+    for flow in flows:
+        if meters and flow.name not in meters:
+            log.warning(METERS, message("upkeep_meter_unlisted", "meter {name} of the log is not "
+                        "listed; its factor is taken as 1 with the prior u",
+                        name=flow.name))  # fmt: skip
+    return Inputs(sections, operation, steps, findings, tuple(sources), len(pieces), traceable,
+                  tuple(log.warnings))  # fmt: skip
+
+
+def _judge_cleaning(findings, file, log):
+    """Warn of, or refuse, a level log of which too many rows are unused."""
+    rows = findings.number("levels", "row")
+    unused = sum(findings.number("levels", kind)
+                 for kind in ("stuck", "interpolated", "bad_quality", "not_a_number",
+                              "other_value", "doubled_hour", "no_time"))  # fmt: skip
+    share = unused / max(rows, 1)
+    if share > UNUSED_WARNED:
+        text = message("upkeep_much_unused", "{share:.0f} % of the levels are unused (see "
+                       "cleaning.csv); expected at most {most:.0f} %", share=100 * share,
+                       most=100 * UNUSED_REFUSED)  # fmt: skip
+        (log.problem if share > UNUSED_REFUSED else log.warning)(file, text)
+
+
+def _read_events(files, log):
+    """Events in order of time: dicts with time, kind, meter, value."""
+    events = []
+    for file in files:
+        for chunk in file.chunks():
+            for place, kind in enumerate(chunk["kind"]):
+                kind = str(kind).strip()
+                if kind not in EVENTS:
+                    text = message("upkeep_event", "found {kind}; expected a kind of {kinds}",
+                                   kind=shown(kind), kinds=", ".join(EVENTS))  # fmt: skip
+                    log.problem(file.path.name, text, int(chunk["row"][place]), "kind")
+                meter = chunk["meter"][place] if "meter" in chunk else None
+                events.append(
+                    {"time": int(chunk["time"][place]), "kind": kind,
+                     "meter": meter if isinstance(meter, str) else None}
+                )  # fmt: skip
+    return sorted(events, key=lambda event: event["time"])
+
+
+def _read_tickets(files, findings):
+    """`Tickets` in order of time, each once."""
+    parts = [chunk for file in files for chunk in file.chunks()]
+    if not parts:
+        empty = np.zeros(0)
+        return Tickets(empty.astype(np.int64), empty, empty, empty.astype(int))
+
+    def column(name):
+        return np.concatenate(
+            [part.get(name, np.full(len(part["time"]), np.nan)) for part in parts]
+        )
+
+    time, volume, temperature, row = map(column, ("time", "volume", "temperature", "row"))
+    is_known = np.isfinite(volume.astype(float)) & (volume.astype(float) > 0)
+    findings.add("deliveries", "no_volume", time[~is_known])
+    _, first = np.unique(np.stack([time, volume]), axis=1, return_index=True)
+    is_first = np.isin(np.arange(len(time)), first)
+    findings.add("deliveries", "duplicate", time[is_known & ~is_first])
+    kept = np.flatnonzero(is_known & is_first)
+    kept = kept[np.argsort(time[kept], kind="stable")]
+    return Tickets(time[kept].astype(np.int64), volume[kept].astype(float),
+                   temperature[kept].astype(float), row[kept])  # fmt: skip
+
+
+def _read_air(files):
+    """(times, temperatures) of the air; None without files."""
+    parts = [(chunk["time"], chunk["temperature"]) for file in files for chunk in file.chunks()]
+    if not parts:
+        return None
+    time, values = (np.concatenate(part) for part in zip(*parts, strict=True))
+    order = np.argsort(time, kind="stable")
+    order = order[np.isfinite(values[order])]
+    return time[order].astype(float), values[order]

@@ -1,0 +1,185 @@
+"""Saved upkeep of a tank: upkeep.json."""
+
+from pathlib import Path
+
+from tankcal.record.covariance_factor import FactorBlock
+from tankcal.record.saved_formats import SavedFormat
+from tankcal.record.schema import Finite, Saved, key
+from tankcal.record.texts import WarningRecord
+from tankcal.version import find_version
+
+UPKEEP = SavedFormat(
+    "tankcal-upkeep", 1, "upkeep.json", schemas=Path(__file__).with_name("schemas")
+)
+MODES = ("improved", "deliveries", "watched")
+VERDICTS = ("pass", "fail", "inconclusive")
+
+
+class UpkeepPeriod(Saved):
+    """Time and steps."""
+
+    first: str = key("day of the first quiet mark, UTC")
+    last: str = key("day of the last quiet mark, UTC")
+    days: Finite = key("duration")
+    pieces: int = key("quiet pieces of the level log")
+    steps: int = key("steps between quiet marks")
+    used: int = key("steps of the estimate")
+    rejected: int = key("steps rejected as outliers")
+    lowest_m: Finite = key("lowest level of the used steps")
+    highest_m: Finite = key("highest level of the used steps")
+    sold_m3: Finite = key("metered volume")
+    delivered_m3: Finite = key("volume of the tickets")
+
+
+class UpkeepFit(Saved):
+    """Agreement of the steps with the model."""
+
+    chi2: Finite = key("weighted sum of squares")
+    dof: int = key("its degrees of freedom")
+    probability: Finite = key("of a larger sum, if the model is right")
+    passes: int = key("linearisations until the adjusted levels were steady")
+    scale: Finite = key("factor on all U: 1, or the root of chi2 over dof if larger")
+
+
+class UpkeepRow(Saved):
+    """A row of the table."""
+
+    height_m: Finite = key("dip")
+    former_m3: Finite = key("volume of the former table")
+    former_U_m3: Finite = key("expanded")
+    volume_m3: Finite = key("volume of the new table")
+    U_m3: Finite = key("expanded")
+    En: float | None = key("change over the root of the difference of squared U; null: no change")
+    is_seen: bool = key("whether the level is within the levels of the steps")
+
+
+class UpkeepDelivery(Saved):
+    """A delivery between two dips."""
+
+    low_m: Finite = key("lower dip")
+    high_m: Finite = key("upper dip")
+    former_m3: Finite = key("by the former table")
+    former_U_m3: Finite = key("expanded")
+    volume_m3: Finite = key("by the new table")
+    U_m3: Finite = key("expanded")
+
+
+class UpkeepMeter(Saved):
+    """A meter by the tank."""
+
+    name: str = key("of the meter")
+    volume_m3: Finite = key("metered volume")
+    certificate: str | None = key("null: not traceable")
+    prior_percent: Finite = key("U of the factor before, at the coverage of all U")
+    deviation_percent: Finite = key("deviation of the factor from its certificate, or from 1")
+    U_percent: Finite = key("expanded")
+    correlation: Finite = key("with the volume between the lowest and highest level of the steps")
+
+
+class UpkeepCause(Saved):
+    """A cause of the model."""
+
+    name: str = key("of the cause")
+    kind: str = key("group of causes")
+    unit: str = key("of prior, estimate and u")
+    mean: Finite = key("prior")
+    prior_u: Finite = key("standard uncertainty before")
+    estimate: Finite = key("after the steps")
+    u: Finite = key("standard uncertainty after")
+
+
+class UpkeepMonth(Saved):
+    """Watching of a month."""
+
+    month: str = key("year-month")
+    steps: int = key("used steps")
+    leak_l_h: Finite = key("change of the loss by time in this month; positive: out of the tank")
+    U_l_h: Finite = key("expanded")
+    detectable_l_h: float | None = key(
+        "smallest rate detected with 95 % at 5 % of false alarms; null: not determined"
+    )
+    verdict: str = key(", ".join(VERDICTS))
+    throughput_percent: Finite = key("change of causes proportional to the metered volume")
+    U_percent: Finite = key("expanded")
+
+
+class UpkeepSuspect(Saved):
+    """A cause that may have begun."""
+
+    kind: str = key("of the cause")
+    member: str | None = key("meter")
+    unit: str = key("of size and sd")
+    day: str = key("beginning, UTC")
+    size: Finite = key("estimate")
+    sd: Finite = key("standard deviation")
+    w: Finite = key("size over sd")
+    is_possible: bool = key("whether the data do not distinguish it from the most likely cause")
+
+
+class UpkeepWatch(Saved):
+    """Watching of the whole period."""
+
+    rate_per_year: Finite = key("declared false alarms per year")
+    limit: Finite = key("of |w|")
+    limit_of_model: Finite = key("for innovations drawn by the model")
+    limit_of_tank: float | None = key("for the innovations of the tank; null: under 180 days")
+    is_provisional: bool = key("whether the limit is 1.5 times that of the model")
+    false_alarms: float | None = key(
+        "probability of an alarm without fault, by the innovations of the tank"
+    )
+    largest: Finite = key("largest |w|")
+    alarm: str | None = key("day of the first alarm, UTC; null: none")
+    is_named: bool = key("whether a single cause explains the alarm")
+    suspects: list[UpkeepSuspect] = key("the most likely first")
+
+
+class UpkeepCount(Saved):
+    """Rows of a log of a kind."""
+
+    log: str = key("levels, meters, deliveries ...")
+    kind: str = key("duplicate, late, stuck ...")
+    count: int = key("number")
+    first: str | None = key("first time, UTC, to the hour")
+    last: str | None = key("last time, UTC, to the hour")
+
+
+class UpkeepSource(Saved):
+    """A file of the upkeep."""
+
+    kind: str = key("settings, record, levels ...")
+    file: str = key("name")
+    sha256: str = key("of its bytes")
+    chain: str = key("SHA-256 of the chain before and of this file")
+
+
+class UpkeepFile(Saved, kw_only=True):
+    """A calibration kept up by everyday data."""
+
+    format: str = key("see Versions", default=UPKEEP.format)
+    tankcal: str = key("version of tankcal", default_factory=find_version)
+    notice: str = key("on every page, such as EXAMPLE", default="")
+    tank: str = key("name of the tank")
+    record_sha256: str = key("of the record of the former table")
+    coverage_probability: Finite = key("of all U")
+    k: Finite = key("coverage factor of all U")
+    site: str | None = key("as declared")
+    by: str | None = key("person who made the upkeep")
+    note: str | None = key("remark")
+    service: str = key('"station" or "terminal"')
+    liquid: str | None = key("name of the liquid")
+    mode: str = key(", ".join(MODES))
+    reasons: list[str] = key("why the table is not improved, or its contents are not stated")
+    period: UpkeepPeriod = key("time and steps")
+    fit: UpkeepFit = key("agreement with the model")
+    rows: list[UpkeepRow] = key("former and new table; empty: only deliveries are stated")
+    factor: list[FactorBlock] = key("covariance factor of the rows")
+    deliveries: list[UpkeepDelivery] = key("between dips within the levels of the steps")
+    meters: list[UpkeepMeter] = key("meters by the tank")
+    causes: list[UpkeepCause] = key("without those of the table")
+    months: list[UpkeepMonth] = key("in order")
+    watch: UpkeepWatch = key("search for causes that began")
+    cleaning: list[UpkeepCount] = key("rows by kind")
+    left_out: list[UpkeepCount] = key("steps without use, by reason")
+    inputs: dict = key("upkeep.toml as {section: {key: value}}, without blank keys")
+    files: list[UpkeepSource] = key("input files in the order of reading")
+    warnings: list[WarningRecord] = key("on the upkeep")

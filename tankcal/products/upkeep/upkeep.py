@@ -1,0 +1,295 @@
+"""The upkeep of a tank: new table, meters by the tank, months, watching, omitted rows."""
+
+import hashlib
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import scipy.linalg
+
+from tankcal.errors import Problem
+from tankcal.gum.coverage import coverage_factor
+from tankcal.messages import message
+from tankcal.products.settings import drop_blanks
+from tankcal.products.upkeep import saved
+from tankcal.products.upkeep.estimation import LEAST_RANGE, LEAST_STEPS, estimate
+from tankcal.products.upkeep.filtering import total_innovations, whiten_steps
+from tankcal.products.upkeep.reading import SETTINGS
+from tankcal.products.upkeep.steps import REASONS
+from tankcal.products.upkeep.watching import SIR_SD, watch
+from tankcal.record.covariance_factor import blocks_of
+from tankcal.record.texts import warnings_of
+
+UNTRACEABLE_PERCENT = 1.0  # u of the common factor of meters without a certificate
+WIDE = 0.005  # relative u of the former contents above which only deliveries are stated
+GLOBAL_TEST = 1e-3  # least probability of chi-square for an improved table
+SIR_LIMIT_L_H = 0.757  # 0.2 gal/h, the rate of inventory reconciliation (40 CFR 280.43)
+ROWS_SHOWN = 4  # deliveries between fifths of the seen levels
+VARIANCE_RATIO = 2.0  # of observed and declared variances, beyond which a warning is given
+
+
+def keep_up(inputs):
+    """Estimate the table and the meters of a tank, and watch it.
+
+    Parameters
+    ----------
+    inputs : reading.Inputs
+
+    Returns
+    -------
+    saved.UpkeepFile
+
+    Raises
+    ------
+    InputError
+        If the model does not fit the tank.
+    """
+    sections, operation = inputs.sections, inputs.operation
+    warnings = list(inputs.warnings)
+    if not inputs.traceable:
+        common = max(operation.priors["meters_common_percent"], UNTRACEABLE_PERCENT)
+        operation = replace(operation, priors=operation.priors | {"meters_common_percent": common})
+    estimation = estimate(operation, inputs.steps)
+    probability = sections["upkeep"]["coverage_probability"] or 0.95
+    k = float(coverage_factor(probability, np.inf))
+    ratio = estimation.triangle.chi2 / max(estimation.triangle.count, 1)
+    scale = float(np.sqrt(max(ratio, 1.0)))
+    if not 1 / VARIANCE_RATIO <= ratio <= VARIANCE_RATIO:
+        text = message("upkeep_variances", "the innovations have {ratio:.2f} times the declared "
+                       "variance; declare level_mm, gauge_wander_mm and the tickets in [priors] as "
+                       "observed. U takes the larger variance", ratio=ratio)  # fmt: skip
+        warnings.append(Problem(SETTINGS, text, column="priors"))
+    used = estimation.is_used
+    ends = np.append(used, False) | np.append(False, used)
+    levels = estimation.balance.level_m[ends]
+    low, high = (float(levels.min()), float(levels.max())) if ends.any() else (0.0, 0.0)
+    table = inputs.table
+    volume, factor = update_table(estimation, operation.stock, low, high)
+    former_u = np.linalg.norm(table.factor_m3, axis=1)
+    seen = (table.height_m >= low) & (table.height_m <= high)
+    reasons = _refusals(estimation, table, low, high, former_u, seen, inputs.traceable)
+    mode = "improved"
+    if {"few_steps", "small_range", "global_test"} & set(reasons):
+        mode = "watched"
+    elif "wide_former" in reasons:
+        mode = "deliveries"
+    if mode == "watched":
+        volume, factor = table.volume_m3, table.factor_m3
+    table_scale = 1.0 if mode == "watched" else scale
+    spread = k * table_scale * np.linalg.norm(factor, axis=1)
+    seconds = np.append(0.0, np.cumsum(inputs.steps.seconds))
+    start = inputs.steps.marks.time_ns[0]
+    watched = watch(estimation, sections["watch"]["false_alarm_per_year"] or 0.05)
+
+    def day(at_s):
+        return str(np.datetime64(int(start + at_s * 1e9), "ns").astype("datetime64[D]"))
+
+    names = {id(suspect) for suspect in watched.names}
+    return saved.UpkeepFile(
+        notice=sections["upkeep"]["notice"] or "",
+        tank=table.tank,
+        record_sha256=table.digest,
+        coverage_probability=probability,
+        k=k,
+        **{name: sections["upkeep"][name] for name in ("site", "by", "note", "service")},
+        liquid=sections["liquid"]["name"],
+        mode=mode,
+        reasons=reasons,
+        period=saved.UpkeepPeriod(
+            day(0.0), day(seconds[-1]), float(seconds[-1] / 86400), inputs.pieces,
+            len(inputs.steps), int(used.sum()), len(estimation.rejected), low, high,
+            float(inputs.steps.sold_m3.sum()), float(inputs.steps.delivered_m3.sum()),
+        ),
+        fit=saved.UpkeepFit(estimation.triangle.chi2, estimation.triangle.count,
+                            estimation.probability, estimation.passes, scale),
+        rows=[] if mode == "deliveries" else [
+            saved.UpkeepRow(float(h), float(old), float(k * u), float(new), float(U),
+                            _error_ratio(new - old, k * u, U), bool(is_seen))
+            for h, old, u, new, U, is_seen in zip(
+                table.height_m, table.volume_m3, former_u, volume, spread, seen, strict=True)
+        ],
+        factor=[] if mode == "deliveries" else blocks_of(table_scale * factor),
+        deliveries=_deliveries(table, volume, factor, low, high, k, table_scale),
+        meters=_meters(estimation, operation, inputs, factor, low, high, k, scale),
+        causes=_causes(estimation),
+        months=_months(estimation, start, k, scale),
+        watch=saved.UpkeepWatch(
+            watched.rate, watched.limit, watched.limit_of_model, watched.limit_of_tank,
+            watched.is_provisional, watched.false_alarms, watched.largest,
+            None if watched.alarm_s is None else day(watched.alarm_s), watched.is_named,
+            [saved.UpkeepSuspect(cause.kind, cause.member, cause.unit, day(cause.start_s),
+                                 cause.size, cause.sd, cause.w, id(cause) in names)
+             for cause in watched.suspects[:8]],
+        ),
+        cleaning=[_count(log, kind, entry)
+                  for (log, kind), entry in sorted(inputs.findings.counts.items())],
+        left_out=[
+            saved.UpkeepCount("steps", REASONS[code], int(np.sum(inputs.steps.reason == code)),
+                              None, None)
+            for code in range(1, len(REASONS)) if np.any(inputs.steps.reason == code)
+        ],
+        inputs=drop_blanks(sections),
+        files=_chain(inputs.sources),
+        warnings=warnings_of(warnings),
+    )  # fmt: skip
+
+
+def update_table(estimation, stock, low_m, high_m):
+    """New volumes and their covariance factor at the rows of the table.
+
+    Rows between the levels of the steps take the estimates x of the causes of the table, with
+    columns C and cov(x) = P afterwards. Rows above keep the increments of the former table, and
+    rows below its shape:
+
+        V_new(h) = V(h) + s(h) C(h') x,      h' = h within the levels, otherwise their end,
+
+    with s = V(h) / V(h') below and 1 elsewhere. The true x is the sum of its estimate, with
+    covariance I - P, and of an independent error with covariance P, so that the error is
+
+        C(h) P^1/2,  [C(h) - s C(h')] (I - P)^1/2.
+
+    Parameters
+    ----------
+    estimation : estimation.Estimation
+    stock : causes.TableStock
+    low_m, high_m : float
+        Levels of the used steps.
+
+    Returns
+    -------
+    volume : ndarray, shape (rows,)
+    factor : ndarray, shape (rows, q)
+    """
+    table, count = stock.table, len(stock.names)
+    x, covariance = estimation.triangle.estimate[:count], estimation.covariance[:count, :count]
+    held = np.clip(table.height_m, low_m, high_m)
+    columns, at_ends = stock.factor_m3, stock.columns(held, x)
+    below = table.height_m < low_m
+    share = np.where(below, table.volume_m3 / table.volume(np.array([low_m]))[0], 1.0)
+    moved = share[:, None] * at_ends
+    inside = scipy.linalg.cholesky(covariance, lower=True)
+    sizes, axes = np.linalg.eigh(np.eye(count) - covariance)
+    known = axes * np.sqrt(np.maximum(sizes, 0.0))
+    factor = np.hstack([columns @ inside, (columns - moved) @ known])
+    return table.volume_m3 + moved @ x, factor
+
+
+def _refusals(estimation, table, low, high, former_u, seen, traceable):
+    """Codes of refusals and restrictions."""
+    reasons = []
+    if estimation.triangle.count < LEAST_STEPS:
+        reasons.append("few_steps")
+    if high - low < LEAST_RANGE * np.ptp(table.height_m):
+        reasons.append("small_range")
+    if estimation.probability < GLOBAL_TEST:
+        reasons.append("global_test")
+    if np.any(seen) and np.median(former_u[seen] / table.volume_m3[seen]) > WIDE:
+        reasons.append("wide_former")
+    if not traceable:
+        reasons.append("no_traceable_meter")
+    return reasons
+
+
+def _error_ratio(change, former_U, U):
+    """E_n of a table that contains the former table: change / sqrt(U_old^2 - U_new^2)."""
+    difference = former_U**2 - U**2
+    return float(change / np.sqrt(difference)) if difference > 1e-12 * former_U**2 else None
+
+
+def _deliveries(table, volume, factor, low, high, k, scale):
+    """Deliveries between fifths of the levels of the steps, and over all of them."""
+    edges = np.linspace(low, high, ROWS_SHOWN + 2)
+    pairs = [*pairwise(edges), (low, high)]
+    new = replace(table, volume_m3=volume, factor_m3=factor)
+    result = []
+    for first, last in pairs:
+        ends = np.array([first, last])
+        values = []
+        for source, share in ((table, 1.0), (new, scale)):
+            spread = np.linalg.norm(np.diff(source.factor(ends), axis=0))
+            values += [float(np.diff(source.volume(ends))[0]), float(k * share * spread)]
+        result.append(saved.UpkeepDelivery(float(first), float(last), *values))
+    return result
+
+
+def _meters(estimation, operation, inputs, factor, low, high, k, scale):
+    """Meters by the tank, with the correlation to the table between the levels of the steps."""
+    causes, covariance = estimation.balance.causes, estimation.covariance
+    count, ends = len(operation.stock.names), np.array([low, high])
+    x = estimation.triangle.estimate
+    between = np.zeros(len(x))
+    between[:count] = np.diff(operation.stock.columns(ends, x[:count]), axis=0)[0]
+    sd_table = np.sqrt(max(between @ covariance @ between, 1e-300))
+    common, meters = causes.place("meters"), []
+    for place in causes.place("meter"):
+        name = causes.names[place].removeprefix("meter ")
+        weights = np.zeros(len(x))
+        weights[place] = causes.sd[place]
+        weights[common] = causes.sd[common]
+        sd = np.sqrt(weights @ covariance @ weights)
+        metered = inputs.steps.sold_m3[:, inputs.steps.meters.index(name)].sum()
+        meters.append(
+            saved.UpkeepMeter(
+                name, float(metered), name if name in inputs.traceable else None,
+                float(k * np.linalg.norm(weights)), float(weights @ x), float(k * scale * sd),
+                float(weights @ covariance @ between / sd / sd_table),
+            )
+        )  # fmt: skip
+    return meters
+
+
+def _causes(estimation):
+    """Causes other than those of the table."""
+    causes, (size, u) = estimation.balance.causes, estimation.sizes()
+    return [
+        saved.UpkeepCause(causes.names[i], causes.kinds[i], causes.units[i], float(causes.mean[i]),
+                          float(causes.sd[i]), float(size[i]), float(u[i]))
+        for i in range(len(causes.names)) if causes.kinds[i] not in ("table", "form")
+    ]  # fmt: skip
+
+
+def _months(estimation, start_ns, k, scale):
+    """Leak and throughput of each month, by the innovations."""
+    steps, drift = estimation.steps, estimation.balance.drift
+    ends = (steps.marks.time_ns[1:]).view("datetime64[ns]").astype("datetime64[M]")
+    months = np.unique(ends)
+    inside = ends[:, None] == months
+    leak = inside * (drift.seconds / 3.6e6)[:, None]
+    through = inside * (drift.metered_m3.sum(axis=1) / 100)[:, None]
+    white = whiten_steps(drift, np.hstack([leak, through])).rows
+    both = total_innovations(estimation.whitened.rows, estimation.is_used, white)
+    e, columns = both[:, 0], both[:, 1:]
+    information = np.maximum(np.sum(columns**2, axis=0), 1e-12)
+    sizes, sd = columns.T @ e / information, scale / np.sqrt(information)
+    result, count = [], len(months)
+    for i, month in enumerate(months):
+        detectable = SIR_SD * sd[i]
+        verdict = "inconclusive"
+        if detectable <= SIR_LIMIT_L_H:
+            verdict = "fail" if sizes[i] > detectable / 2 else "pass"
+        result.append(
+            saved.UpkeepMonth(
+                str(month), int(np.sum(estimation.is_used & inside[:, i])), float(sizes[i]),
+                float(k * sd[i]), float(detectable) if detectable < 1e3 else None, verdict,
+                float(sizes[count + i]), float(k * sd[count + i]),
+            )
+        )  # fmt: skip
+    return result
+
+
+def _count(log, kind, entry):
+    """`UpkeepCount` of a finding; times to the hour, so that no single sale shows."""
+    texts = [
+        None if time is None else str(np.datetime64(time, "ns").astype("datetime64[h]"))
+        for time in entry[1:]
+    ]
+    return saved.UpkeepCount(log, kind, entry[0], *texts)
+
+
+def _chain(sources):
+    """Files with the hash of their chain: each contains the hash before."""
+    chain, files = "", []
+    for source in sources:
+        chain = hashlib.sha256(f"{chain}{source.sha256}".encode()).hexdigest()
+        files.append(saved.UpkeepSource(source.kind, source.file, source.sha256, chain))
+    return files
