@@ -27,7 +27,7 @@ def add(commands):
         description="From level logs, meters and delivery tickets of a tank in service to its "
         "improved table, the factors of its meters and a monthly leak rate, each with U, and to "
         "alarms. See docs/upkeep.md.",
-        epilog="exit status: 0 done, also with an alarm; 2 the input must be corrected (one line "
+        epilog="exit status: 0 done, also with an alarm; 2 the input must be corrected (a line "
         "per problem: file, row, column, expected value).",
     )
     upkeep.add_argument("folder", metavar="DIR", help="folder with upkeep.toml and the logs")

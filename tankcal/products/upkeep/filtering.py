@@ -136,7 +136,7 @@ def whiten_steps(drift, data, state=None, *, is_smoothed=False):
     state : FilterState, optional
         State at the first mark; None: no earlier steps.
     is_smoothed : bool, default False
-        True: data are y alone, and the states at all marks are estimated from all steps.
+        True: data are y alone, and the states at every mark are estimated from all steps.
 
     Returns
     -------
