@@ -38,6 +38,7 @@ EXAMPLES = (  # folder, title, measurement, page of the method, notebook
     ("sphere-straps", "Sphere", "equator and meridians by tape", "spheres", None),
     ("ship", "Ship tank", "a closed mesh, trim and list", "ships", None),
 )
+WALLS = ("silva-1995", "total-station", "silva-1995-photos", "wall-hits", "tangents", "cloud")
 OTHERS = {  # folders without a capacity table of their own, and their pages
     "compare": "compare",
     "former-table": "read-table",
@@ -81,7 +82,7 @@ def text_of(folder, title, measured, page, notebook, pictures):
         warnings.simplefilter("ignore")
         job = tankcal.load(ROOT / "examples" / folder)
         result = tankcal.run(job)
-        figure = result.plot()
+        figure = result.plot("field" if folder in WALLS else "capacity")
     figure.savefig(pictures / f"{folder}.svg", bbox_inches="tight", metadata={"Date": None})
     budget = result.budget()
     lines = sorted(budget.lines, key=lambda line: -line.share)
