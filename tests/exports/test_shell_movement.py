@@ -39,7 +39,7 @@ def test_line_of_s1():
     assert found.start_m == pytest.approx(2.46, abs=0.01)
     assert round(1000 * found.factor, 4) == 0.0618
     printed = figures_of(
-        "docs/exports.md",
+        "docs/studies/exports.md",
         "() kg/m3, has () m and () mm/m, with an error of at most () mm",
     )
     assert agree([850, found.start_m, 1000 * found.factor, 1000 * found.off_m], printed)

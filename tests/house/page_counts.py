@@ -22,7 +22,7 @@ LONGEST = 2200  # words: ten minutes
 STEP = 500  # the sum counts in such steps, so that a sentence more in a page is no fault
 GENERATED = ("job-format.md", "plausible-values.md", "saved-keys.md", "record-format.md")
 OTHER_KINDS = ("Studies", "For developers")  # headings of docs/index.md outside the sum
-FOREIGN = re.compile(r"(?:comece|empiece|-es\b|-pt-BR\b)")
+FOREIGN = re.compile(r"(?:comece|empiece|glossary|-es\b|-pt-BR\b)")
 SUM, TRANSLATIONS = "words of all pages in English", "words of all translations"
 
 

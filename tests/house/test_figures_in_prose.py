@@ -95,13 +95,13 @@ def error_of_interpolation(rows_m):
 
 def test_interpolation_in_a_table_of_a_lying_tank():
     printed = figures_of(
-        "docs/rings.md",
+        "docs/studies/rings.md",
         "the error is () L with rows of 1 mm, () L with 5 mm, () L with 10 mm, and () L with 50 mm",
     )
     even = [error_of_interpolation(np.linspace(0, 2.4, n + 1))[0] for n in (2400, 480, 240, 48)]
     assert rounded(even, printed) == printed
     printed = figures_of(
-        "docs/table.md",
+        "docs/studies/linter.md",
         "With rows of 1 cm it has an error of () L at () mm, and an equal error below its top. "
         "With rows of 2 mm up to () m and from () m on (() rows in all) the error is below () L",
     )

@@ -119,7 +119,7 @@ LIMITS = [
         [letterhead.MAX_LOGO_BYTES / 1000, letterhead.MAX_LOGO_PIXELS],
     ),
     ("docs/report-code.md", "A table of up to () rows is not divided", [page_constant("short")]),
-    ("docs/certificate.md", "Tables end after () rows", [quality.MOST_ROWS]),
+    ("docs/report-code.md", "Tables end after () rows", [quality.MOST_ROWS]),
     (
         "docs/report-code.md",
         "at most about twice this value (() mL if the largest u is () m³)",
@@ -530,7 +530,7 @@ LIMITS += [
         [PERCENT * read_table.WORST_FIT],
     ),
     (
-        "docs/read-table.md",
+        "docs/studies/read-table.md",
         "if diameters that differ by more than () % explain them",
         [PERCENT * (solid_geometry.LARGEST_RATIO - 1)],
     ),
@@ -586,12 +586,12 @@ LIMITS += [
     ),
     ("docs/liquid.md", "Above () U the certificate states", [liquid_facts.HIDDEN_U]),
     (
-        "docs/liquid.md",
+        "docs/studies/liquid.md",
         "() mm in () m changes the head by () % of its value",
         [1, 6.5, PERCENT * (1 / 6500) * 3],
     ),
     (
-        "docs/liquid.md",
+        "docs/studies/liquid.md",
         "() K is () ppm of a vertical tank",
         [1, 2 * PPM * 1.1e-5],
     ),
@@ -600,9 +600,13 @@ LIMITS += [
         "XML above () MB, of more than () elements, nested more than () deep",
         [e57.LONGEST_XML >> 20, e57.MOST_ELEMENTS, e57.DEEPEST],
     ),
-    ("docs/clouds.md", "numbers that do not resolve () mm", [MM * cloud_reading.COARSEST_M]),
     (
-        "docs/clouds.md",
+        "docs/studies/clouds-files.md",
+        "numbers that do not resolve () mm",
+        [MM * cloud_reading.COARSEST_M],
+    ),
+    (
+        "docs/studies/clouds-files.md",
         "in a child process with () GB of memory",
         [isolation.MEMORY_LIMIT >> 30],
     ),
@@ -887,12 +891,12 @@ LIMITS += [
         [PERCENT * adjust.POWER],
     ),
     (
-        "docs/adjustment.md",
+        "docs/studies/adjustment.md",
         "if more than () % of all values, or a known coordinate, were rejected, and if one known "
         "point or photo lost far more than the others (binomial test, () %)",
         [PERCENT * wrong_readings.MANY, PERCENT * wrong_readings.LEVEL],
     ),
-    ("docs/adjustment.md", "agrees without them (both at () %", [PERCENT * adjust.ALPHA]),
+    ("docs/studies/adjustment.md", "agrees without them (both at () %", [PERCENT * adjust.ALPHA]),
     ("docs/studies/adjustment.md", "contradict each other beyond () %", [PERCENT * means.LEVEL]),
     (
         "docs/adjustment.md",
@@ -1044,7 +1048,7 @@ LIMITS += [
         [MM * boards.BOARD_M, MM * boards.REACH_M],
     ),
     (
-        "docs/inspection.md",
+        "docs/studies/inspection.md",
         "Above () % it is printed as > () %",
         [PERCENT * inspection_paper._SURE, PERCENT * inspection_paper._SURE - 0.05],
     ),

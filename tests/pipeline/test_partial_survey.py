@@ -55,11 +55,11 @@ def test_examples_to_the_printed_digit(given, printed):
     assert ours == list(printed)
     stated = {
         1.2: figures_of(
-            "docs/partial.md",
+            "docs/studies/partial.md",
             "| 0.7, 0.3 | 0.8, 0.3 | 0.4, 0.3 | +1.2 | () | () | () | () %, () % | () % |",
         ),
         -2.0: figures_of(
-            "docs/partial.md",
+            "docs/studies/partial.md",
             "| 0.7, 0.3 | 0.4, 0.6 | 0.4, 0.3 | −2.0 | () | () | () | () %, () % | () % |",
         ),
     }

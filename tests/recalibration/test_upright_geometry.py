@@ -270,7 +270,7 @@ def test_many_simulated_tables(figure):
     figure("largest error of a radius, mm", off.max())
     figure("largest error of a density over its u", np.abs(w).max())
     count, within_mm = figures_of(
-        "docs/read-table.md",
+        "docs/studies/read-table.md",
         "In () simulated tables (litres, rows of 1 cm, up to three pieces of deadwood each) the "
         "head was decided correctly, and all radii were correct within () mm",
     )

@@ -60,11 +60,11 @@ def test_intervals_at_the_limits_of_three_runs(run, least, most):
     share = held(fill_tanks(np.random.default_rng(5), 3000, survey), Calibrator(survey))
     large, small = (
         figures_of(
-            "docs/liquid.md",
+            "docs/studies/liquid.md",
             "95 % intervals cover () to () % if the run effect is far larger than all other "
             "effects (1000 ppm)",
         ),
-        figures_of("docs/liquid.md", "Without any run effect they cover () to () %"),
+        figures_of("docs/studies/liquid.md", "Without any run effect they cover () to () %"),
     )
     assert [100 * least, 100 * most] == pytest.approx([*map(value_of, large if run else small)])
     assert np.all((share > least) & (share < most)), share
