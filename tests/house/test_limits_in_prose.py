@@ -221,9 +221,9 @@ LIMITS = [
         "than chance explains (under () %)",
         [PERCENT * tape_warnings.BY_CHANCE],
     ),
-    ("docs/strapping.md", "the nominal radius is missed by () in ()", ONE_IN_500),
+    ("docs/studies/strapping.md", "the nominal radius is missed by () in ()", ONE_IN_500),
     (
-        "docs/strapping.md",
+        "docs/studies/strapping.md",
         "a course differs from the others by () in ()",
         [1, 2 / NOMINAL["share"]],
     ),
@@ -491,7 +491,7 @@ LIMITS += [
         [MM * (1 / math.cos(math.radians(1)) - 1), 1],
     ),
     (
-        "docs/gauge.md",
+        "docs/studies/gauge.md",
         "If its probability is at least () %, both are pooled. The declared variance has () "
         "degrees of freedom (known to about () %",
         [
@@ -500,7 +500,11 @@ LIMITS += [
             PERCENT / math.sqrt(2 * deviation.SCATTER_DOF),
         ],
     ),
-    ("docs/gauge.md", "Below () %, the residuals alone", [PERCENT * deviation.LEAST_PROBABILITY]),
+    (
+        "docs/studies/gauge.md",
+        "Below () %, the residuals alone",
+        [PERCENT * deviation.LEAST_PROBABILITY],
+    ),
     (
         "docs/upkeep.md",
         "a counter that falls from above () % to below () % of a power of ten",
@@ -548,12 +552,12 @@ LIMITS += [
         [0.70 / math.sqrt(0.46**2 + 0.60**2 - 2 * c * 0.46 * 0.60) for c in (0.0, 0.5)],
     ),
     (
-        "docs/liquid.md",
+        "docs/studies/liquid.md",
         "until no dip moves by more than () of its standard deviation",
         [liquid_steps.DIPS_SETTLED],
     ),
     (
-        "docs/liquid.md",
+        "docs/studies/liquid.md",
         "This is () u for () steps and u = () %, () u for () steps and u = () %",
         [100 * 0.03e-2, 100, 0.03, 300 * 0.5e-2, 300, 0.5],
     ),
@@ -584,7 +588,7 @@ LIMITS += [
         "distinguish from it (())",
         [liquid_adjustment.LEAST, liquid_adjustment.ALIKE],
     ),
-    ("docs/liquid.md", "Above () U the certificate states", [liquid_facts.HIDDEN_U]),
+    ("docs/studies/liquid.md", "Above () U the certificate states", [liquid_facts.HIDDEN_U]),
     (
         "docs/studies/liquid.md",
         "() mm in () m changes the head by () % of its value",
