@@ -20,6 +20,7 @@ _BUILT_IN = (  # in the order of `tankcal --help`
     "tankcal.products.fieldbooks:FieldBooks",
     "tankcal.products.shipped:Planning",
     "tankcal.products.linter:Linter",
+    "tankcal.products.assess:Assessment",
     "tankcal.products.recalibration:FormerTables",
     "tankcal.products.register:Register",
     "tankcal.products.exports:Exports",

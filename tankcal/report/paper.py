@@ -153,7 +153,7 @@ class Paper(PlainPaper):
         return str(job["certificate"].get("date_of_issue") or (job["survey"] or {}).get("date", ""))
 
     def subject(self):
-        """Return the subject of the papers: the tank, or the survey by the name of its job."""
+        """Return the subject of the report: the tank, or the survey by the name of its job."""
         tank = self.record["job"]["tank"]
         if tank is None:
             return f"{self.word('page.survey')} {self.record['job']['source']}"

@@ -1,4 +1,4 @@
-"""Tanks of ships in the papers: sounding pipe, and corrections for trim and list."""
+"""Tanks of ships in the report: sounding pipe, and corrections for trim and list."""
 
 from tankcal.report import blocks
 from tankcal.report.tables import ship as tables

@@ -376,6 +376,7 @@ def _make_results(folder):
                         "{out}/t.csv"), solid | profile),
         "export csv": Base(("export", "{in}/record.json", "--profile", "csv", "--json", "--out",
                             "{out}/t.csv"), solid, complains=False),
+        "assess": Base(("assess", "{in}", "--quiet", "--out", "{out}"), record, complains=False),
         "lint record": Base(("lint", "{in}/record.json", "--json"), record, complains=False),
         "compare": Base(("compare", "{in}/former.toml", "{in}/new.json", "--quiet", "--json"),
                         comparing, complains=False),

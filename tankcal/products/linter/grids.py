@@ -381,12 +381,12 @@ def _drop_unnamed_column(rows):
 # ---- text of a PDF in its layout, extracted with pypdf in a child process
 
 
-def read_pages(path, log):
-    """Return the text of each page in its layout.
+def read_pages(path, log, mode="layout"):
+    """Return the text of each page, or None after reporting to `log` why there is none.
 
-    None after reporting to `log` why there is none.
+    `mode` is that of pypdf: "layout", or "plain" for the order in which the text was written.
     """
-    kind, answer = _ask_child(path)
+    kind, answer = _ask_child(path, mode)
     if kind == PAGES and any(page.strip() for page in answer):
         return tuple(answer)
     log.problem(path.name, _refusal(kind, answer))
@@ -426,9 +426,10 @@ def _refusal(kind, answer):
     return message("lint_damaged_pdf", "not a PDF that can be read, or damaged")
 
 
-def _ask_child(path):
+def _ask_child(path, mode):
     """Return the answer of a child process: (kind, pages or message)."""
     request = {"path": str(path.resolve()), "sys_path": sys.path, "seconds": MOST_SECONDS}
+    request["mode"] = mode
     try:
         done = subprocess.run(
             [sys.executable, "-c", _CODE, json.dumps(request)],
@@ -460,13 +461,13 @@ def main(request):
         limit = request["seconds"]
         resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 1))
     try:
-        answer = _answer(request["path"])
+        answer = _answer(request["path"], request["mode"])
     except Exception as error:
         answer = [DAMAGED, type(error).__name__]
     sys.stdout.write(json.dumps(answer))
 
 
-def _answer(path):
+def _answer(path, mode):
     """Answer of the child process: kind, and the text of the pages or None."""
     import pypdf
 
@@ -477,7 +478,7 @@ def _answer(path):
         return [MANY_PAGES, len(reader.pages)]
     if not _is_short(reader.pages):
         return [LONG_TEXT, None]
-    return [PAGES, [page.extract_text(extraction_mode="layout") for page in reader.pages]]
+    return [PAGES, [page.extract_text(extraction_mode=mode) for page in reader.pages]]
 
 
 def _is_short(pages):

@@ -6,7 +6,7 @@ from tankcal.report.tables.table import Column, Table
 from tankcal.report.uncertainty.stated import MARK, flag_simulated, k_of_rows, stated_U_m3
 from tankcal.text.digits import LITRE_DECIMALS, decimals_of_height, round_u
 
-# Names of the capacity tables in the papers.
+# Names of the capacity tables in the report.
 PRINTED = "capacity capacity_marked capacity_k capacity_k_marked capacity_monte_carlo"
 NOT_FOR_USE = "†"  # mark of rows that must not be used
 

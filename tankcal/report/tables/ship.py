@@ -92,7 +92,7 @@ def corrections_columns(record):
 
 
 def group_by_list(record):
-    """Return [(list in degrees, its cells by trim)] for the tables of the papers."""
+    """Return [(list in degrees, its cells by trim)] for the tables of the report."""
     cells = record["ship"]["cells"]
     return [
         (list_deg, [cell for cell in cells if cell["list_deg"] == list_deg])
