@@ -132,6 +132,7 @@ def _run(job, progress, part_progress, simulated, cluster):
         proportional_parts=_proportional_parts(job, tabulation, intervals.U_m3),
         corrections=_list_corrections(job, survey, tabulation, supplement),
         by_density=_volumes_by_density(job, survey, tabulation.levels_m, zero, supplement),
+        on_high_legs=_table_on_high_legs(job, survey),
         stated=stated,
         simulation=simulation,
         intervals=intervals,
@@ -275,6 +276,19 @@ def _list_corrections(job, survey, tabulation, supplement):
     top = float(tabulation.table.volume_m3[-1])
     by_supplement = supplement.correction(corrections, gross, top)
     return corrections if by_supplement is None else (*corrections, by_supplement)
+
+
+def _table_on_high_legs(job, survey):
+    """`Capacity` with the legs of a floating roof in their high position; None: a single position."""
+    roof = job.roof
+    if roof is None or not job.switches.roof or roof.high_critical_bottom_m is None:
+        return None
+    raised = replace(
+        roof,
+        critical_bottom_m=roof.high_critical_bottom_m,
+        critical_top_m=roof.high_critical_top_m,
+    )
+    return compute_table(replace(job, roof=raised), survey).table
 
 
 def _volumes_by_density(job, survey, levels, zero_m, supplement):

@@ -79,6 +79,8 @@ class Result:
         Corrections with their size at the top row.
     by_density : dict of {float: ndarray}
         {density in kg/m3: volumes (rows,) in m3}: the table for other densities.
+    on_high_legs : Capacity or None
+        Table with the legs of a floating roof in their high position; None: a single position.
     stated : statements.Statements
         Uncertainty budgets and worst deliveries.
     simulation : simulation.TableSimulation or None
@@ -120,6 +122,7 @@ class Result:
     sights: dict[str, object] = field(default_factory=dict)
     ship: "ShipTables | None" = None
     overrulings: Overrulings | None = None
+    on_high_legs: Capacity | None = None
 
     @property
     def wall(self) -> "Wall | None":

@@ -166,6 +166,10 @@ def roof_of(result):
     roof = result.job.roof
     if roof is None:
         return None
+    high = {}
+    if roof.high_critical_bottom_m is not None:
+        high["roof_high_bottom"] = (roof.high_critical_bottom_m, "m")
+        high["roof_high_top"] = (roof.high_critical_top_m, "m")
     return list_details(
         roof_mass=(roof.mass_kg, "kg"),
         roof_weighing=(roof.weighing, None),
@@ -173,6 +177,7 @@ def roof_of(result):
         roof_displacement=(-_correction_m3(result, "roof"), "m3"),
         roof_critical_bottom=(roof.critical_bottom_m, "m"),
         roof_critical_top=(roof.critical_top_m, "m"),
+        **high,
     )
 
 
@@ -343,6 +348,14 @@ class Record(Saved, kw_only=True):
     interpolation: table.InterpolationError | None = key("between rows", default=None)
     proportional_parts: table.PartsOfRows | None = key("of millimetres", default=None)
     densities: list[table.VolumesOfDensity] = key("further densities of the liquid", default=())
+    on_high_legs: list[table.RowOnHighLegs] | None = key(
+        "rows that differ with the roof on high legs; left out with a single position",
+        default=None,
+        optional=True,
+    )
+    roof_corrections: list[table.RoofCorrection] | None = key(
+        "by density; left out without a floating roof", default=None, optional=True
+    )
     gross: table.GrossShell | None = key("null for a tank without courses", default=None)
     corrections: list[Correction] = key("that apply to the job, in their order", default=())
     solid: list[Detail] | None = key("sizes of a tank without courses", default=None)
@@ -400,6 +413,8 @@ def record_of(result):
             interpolation=fill_from(table.InterpolationError, result.straightness),
             proportional_parts=table.proportional_parts_of(result),
             densities=table.densities_of(result),
+            on_high_legs=table.rows_on_high_legs(result),
+            roof_corrections=table.roof_corrections_of(result),
             gross=table.gross_of(result),
             corrections=result.corrections,
             solid=solid_of(result),

@@ -52,6 +52,27 @@ class PartsOfRows(Saved):
     largest_m3: float | None = key("largest error, at least the last printed digit")
 
 
+DENSITY_STEP = 20.0  # kg/m3 between the densities of the roof correction
+
+
+class RowOnHighLegs(Saved):
+    """A row of the table with the legs of the floating roof in their high position."""
+
+    height_m: float = key("dip above the zero of the table")
+    volume_m3: float = key("below the dip")
+    u_m3: float = key("standard uncertainty, by the law of propagation")
+    U_m3: float = key("expanded uncertainty, by the law of propagation")
+    k: float = key("coverage factor")
+    for_use: bool = key("false inside the critical zone of this position")
+
+
+class RoofCorrection(Saved):
+    """Correction of a volume above the critical zone for another density of the liquid."""
+
+    density_kg_m3: float = key("of the liquid")
+    correction_m3: float = key("added to the volume of the table")
+
+
 class VolumesOfDensity(Saved):
     """Volumes of the rows for a further density of the liquid."""
 
@@ -110,6 +131,37 @@ def proportional_parts_of(result):
 def densities_of(result):
     """Return the `VolumesOfDensity` of each further density of the liquid."""
     return [VolumesOfDensity(*volumes) for volumes in result.by_density.items()]
+
+
+def rows_on_high_legs(result):
+    """Return the `RowOnHighLegs`s between the rows where both positions agree; None: no table.
+
+    Below the usual and above the high critical zone both tables agree.
+    """
+    table, roof = result.on_high_legs, result.job.roof
+    if table is None:
+        return None
+    heights = table.height_m
+    first = int(np.searchsorted(heights, roof.critical_bottom_m, side="right")) - 1
+    end = int(np.searchsorted(heights, max(roof.high_critical_top_m, roof.critical_top_m))) + 1
+    rows = slice(max(first, 0), end)
+    columns = (heights, table.volume_m3, table.u_m3, table.U_m3, table.k, table.for_use(heights))
+    return [
+        RowOnHighLegs(*map(float, row[:-1]), bool(row[-1]))
+        for row in zip(*(np.asarray(column)[rows] for column in columns), strict=True)
+    ]
+
+
+def roof_corrections_of(result):
+    """Return the `RoofCorrection`s within 15 % of the density of the table; None without a roof."""
+    roof = next((part for part in result.body.parts if part.kind == "roof"), None)
+    if roof is None:
+        return None
+    reference = roof.reference_density_kg_m3
+    grid = DENSITY_STEP * np.arange(
+        np.ceil(0.85 * reference / DENSITY_STEP), np.floor(1.15 * reference / DENSITY_STEP) + 1
+    )
+    return [RoofCorrection(float(x), float(roof.density_correction_m3(x))) for x in grid]
 
 
 def zero_of(result):

@@ -148,9 +148,14 @@ def _highest_level(ax, paper, per_m):
 def _critical_zone(ax, paper, per_m):
     """Hatch the critical zone, in which a floating roof neither rests nor floats."""
     sizes = {size["code"]: size["value"] for size in paper.record["roof"] or ()}
-    low, high = (sizes.get(f"roof_critical_{end}") for end in ("bottom", "top"))
-    if low is None or high is None:
-        return
+    for position in ("critical", "high"):
+        low, high = (sizes.get(f"roof_{position}_{end}") for end in ("bottom", "top"))
+        if low is not None and high is not None:
+            _draw_zone(ax, paper, per_m, low, high)
+
+
+def _draw_zone(ax, paper, per_m, low, high):
+    """Hatch a critical zone between two dips, m."""
     zero = _zero_y(paper.record, per_m)
     extent = (_RIGHT - _LEFT, per_m * (high - low))
     style = {"facecolor": "none", "edgecolor": GREY, "hatch": "////", "linewidth": 0.4}

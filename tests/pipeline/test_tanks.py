@@ -192,6 +192,47 @@ def test_a_floating_roof_is_deducted_above_its_critical_zone(tmp_path):
 
 
 @pytest.mark.slow
+def test_roof_on_high_legs_floats_off_later(tmp_path):
+    """Closed forms: the whole displacement between the zones, none below, and equal above."""
+    legs = {"weighing": "vacuum", "high_critical_bottom_m": 1.62, "high_critical_top_m": 2.0}
+    found = inside_cylinder(tmp_path / "a", roof=legs)
+    record = record_of(found)
+    rows = {round(row["height_m"], 6): row for row in record["on_high_legs"]}
+    usual = dict(zip(found.table.height_m.round(6).tolist(), found.table.volume_m3, strict=True))
+    displaced = 9000 / 850
+    assert min(rows) == 1.0
+    assert max(rows) == 2.0
+    for height, part in ((1.0, 0.0), (1.15, 0.5), (1.3, 1.0), (1.6, 1.0), (1.81, 0.5), (2.0, 0.0)):
+        row = rows[height]
+        assert row["volume_m3"] - usual[height] == pytest.approx(part * displaced, abs=1e-9)
+    assert [height for height in (1.15, 1.6, 1.62, 1.7, 2.0) if not rows[height]["for_use"]] == [
+        1.7
+    ]
+    alone = {"weighing": "vacuum", "critical_bottom_m": 1.62, "critical_top_m": 2.0}
+    other = inside_cylinder(tmp_path / "b", roof=alone).table
+    at = int(np.searchsorted(other.height_m, 1.7 - 1e-9))
+    assert rows[1.7]["U_m3"] == pytest.approx(other.U_m3[at], rel=1e-12)
+    corrections = {row["density_kg_m3"]: row["correction_m3"] for row in record["roof_corrections"]}
+    assert corrections[740.0] == pytest.approx(9000 / 850 - 9000 / 740)
+    assert min(corrections) == 740.0  # 0.85 * 850 = 722.5, in steps of 20
+    assert max(corrections) == 960.0
+
+
+@pytest.mark.parametrize(
+    ("legs", "expected"),
+    [
+        ({"high_critical_bottom_m": 1.6}, "high_critical_top_m: missing"),
+        ({"high_critical_bottom_m": 1.9, "high_critical_top_m": 1.8}, "expected above"),
+        ({"high_critical_bottom_m": 0.9, "high_critical_top_m": 1.8}, "usual position"),
+    ],
+)
+def test_high_legs_that_contradict_the_usual_position(legs, expected, tmp_path):
+    with pytest.raises(InputError, match=expected) as refused:
+        inside_cylinder(tmp_path, roof=legs)
+    assert len(str(refused.value).splitlines()) == 1
+
+
+@pytest.mark.slow
 def test_a_correction_that_is_switched_off_is_shown_and_not_made(tmp_path):
     settings = {
         "bottom.form": "cone",

@@ -40,6 +40,24 @@ KEYS = (
         ("air", "vacuum"),
         kinds=VERTICAL,
     ),
+    number(
+        "high_critical_bottom_m",
+        "critical_bottom_m with the legs in their high position; blank: a single position",
+        0,
+        100,
+        kinds=VERTICAL,
+    ),
+    number(
+        "high_critical_top_m",
+        "critical_top_m with the legs in their high position",
+        0,
+        100,
+        kinds=VERTICAL,
+    ),
+)
+ZONES = (  # keys of the critical zone, with the legs in their usual and in their high position
+    ("critical_bottom_m", "critical_top_m"),
+    ("high_critical_bottom_m", "high_critical_top_m"),
 )
 
 # Possible mass per area of the tank; aluminium skins have 5 kg/m2, steel double decks 120 kg/m2.
@@ -58,17 +76,15 @@ def upside_down(low, high):
 
 def check_roof(roof, extent, raw, log):
     """Check that all keys are given or none, and critical heights and mass are plausible."""
-    names = [field.name for field in KEYS]
+    names = [field.name for field in KEYS if field.name not in ZONES[1]]
     given = [name for name in names if not is_not_given(raw, "roof", name)]
     for name in names:
         if given and name not in given:
             tell(log.problem, raw, "roof", name, missing_beside(given[0]))
-    low, high = roof["critical_bottom_m"], roof["critical_top_m"]
-    if None not in (low, high) and low >= high:
-        tell(log.problem, raw, "roof", "critical_top_m", upside_down(low, high))
+    if not _check_zones(roof, raw, log):
         return
     if extent.top_m is not None:
-        for name in ("critical_bottom_m", "critical_top_m"):
+        for name in (*ZONES[0], *ZONES[1]):
             if roof[name] is not None and roof[name] > extent.top_m:
                 expected = message(
                     "roof_above_shell",
@@ -80,6 +96,35 @@ def check_roof(roof, extent, raw, log):
                 tell(log.problem, raw, "roof", name, expected)
     if roof["mass_kg"] is not None and extent.area_m2 is not None:
         _check_mass(roof, extent.area_m2, raw, log)
+
+
+def _check_zones(roof, raw, log):
+    """Check the critical zones of both positions of the legs; return False for a reversed zone."""
+    for name, other in (ZONES[1], ZONES[1][::-1]):
+        if roof[name] is not None and roof[other] is None and is_not_given(raw, "roof", other):
+            tell(log.problem, raw, "roof", other, missing_beside(name))
+    for bottom, top in ZONES:
+        low, high = roof[bottom], roof[top]
+        if None not in (low, high) and low >= high:
+            tell(log.problem, raw, "roof", top, upside_down(low, high))
+            return False
+    usual, high_legs = (roof[bottom] for bottom, _ in ZONES)
+    if None not in (usual, high_legs) and high_legs <= usual:
+        expected = message(
+            "high_legs_below",
+            "found {high:g}; expected above critical_bottom_m = {low:g}, with the legs in their "
+            "usual position",
+            high=high_legs,
+            low=usual,
+        )
+        tell(log.problem, raw, "roof", ZONES[1][0], expected)
+    if high_legs is not None and "liquid" in raw.tables:
+        expected = message(
+            "high_legs_with_liquid",
+            "given beside metered liquid; expected a single position of the legs",
+        )
+        tell(log.problem, raw, "roof", ZONES[1][0], expected)
+    return True
 
 
 def _check_mass(roof, area, raw, log):

@@ -160,6 +160,8 @@ class Roof:
         Density of the liquid of the table.
     weighing : str
         "air" or "vacuum": condition of the weighing that gave `mass_kg`.
+    high_critical_bottom_m, high_critical_top_m : float or None
+        Critical zone with the legs in their high position; None: they have a single position.
     """
 
     mass_kg: float
@@ -167,6 +169,8 @@ class Roof:
     critical_top_m: float
     reference_density_kg_m3: float
     weighing: str
+    high_critical_bottom_m: float | None = None
+    high_critical_top_m: float | None = None
 
 
 @dataclass(frozen=True)

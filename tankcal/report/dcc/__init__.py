@@ -233,9 +233,41 @@ def _capacity(parent, languages):
     if not all(capacity["for_use"]):
         use = ["yes" if is_for_use else "no" for is_for_use in capacity["for_use"]]
         add_words(table, "forUse", use, languages.word("dcc.for_use"))
+    if rows := languages.record.get("on_high_legs"):
+        _high_legs(parent, languages, rows)
+    if corrections := languages.record.get("roof_corrections"):
+        _roof_corrections(parent, languages, corrections)
     for volumes in languages.record["densities"]:
         names = languages.each(_density_writer(volumes["density_kg_m3"]))
         add_real_list(table, "volumeOfDensity", volumes["volume_m3"], CUBIC_METRE, names)
+
+
+def _high_legs(parent, languages, rows):
+    """Add the rows with the roof on high legs."""
+    element = add_child(parent, "list", refType="tankcal_onHighLegs")
+    add_text(element, "name", languages.word("headings.on_high_legs"))
+    for name, key, unit, word in (
+        ("dip", "height_m", METRE, "dip"),
+        ("volume", "volume_m3", CUBIC_METRE, "volume"),
+        ("expandedUncertainty", "U_m3", CUBIC_METRE, "U"),
+        ("coverageFactor", "k", ONE, "k"),
+    ):
+        values = [row[key] for row in rows]
+        add_real_list(element, name, values, unit, languages.word(f"dcc.{word}"))
+    use = ["yes" if row["for_use"] else "no" for row in rows]
+    add_words(element, "forUse", use, languages.word("dcc.for_use"))
+
+
+def _roof_corrections(parent, languages, corrections):
+    """Add the corrections for the density of the liquid on which the roof floats."""
+    element = add_child(parent, "list", refType="tankcal_roofCorrections")
+    add_text(element, "name", languages.word("headings.roof_corrections"))
+    for name, key, unit in (
+        ("density", "density_kg_m3", DENSITY),
+        ("correction", "correction_m3", CUBIC_METRE),
+    ):
+        values = [row[key] for row in corrections]
+        add_real_list(element, name, values, unit, languages.word(f"table_headings.{key}"))
 
 
 def _density_writer(value):

@@ -133,6 +133,40 @@ def capacity_table(record):
     )  # fmt: skip
 
 
+def high_legs_table(record):
+    """Return the Table of the rows with the roof on high legs, in the units of the job."""
+    spec = record["job"]["table"]
+    least = numbers.unit(spec["volume_unit"]).least
+    return Table(
+        "on_high_legs",
+        (
+            height_column(spec, "height_m", sheet="dip_height_m", width=13),
+            Column("volume_m3", spec["volume_unit"], u="U_m3", least=least, sheet="volume_m3",
+                   width=14, in_sheet={"unit": "m3", "least": LITRE_DECIMALS}),
+            Column("U_m3", spec["volume_unit"], u="U_m3", sheet="expanded_m3",
+                   in_sheet={"unit": "m3"}),
+            Column("for_use", text=_mark, nothing="", heading="by_monte_carlo", sheet="use",
+                   width=14, in_sheet={"text": _use}),
+        ),
+        rows=lambda record: record.get("on_high_legs") or [],
+    )  # fmt: skip
+
+
+def roof_corrections_table(record):
+    """Return the Table of the corrections for the density of the liquid on which a roof floats."""
+    unit = record["job"]["table"]["volume_unit"]
+    least = numbers.unit(unit).least
+    return Table(
+        "roof_corrections",
+        (
+            Column("density_kg_m3", "kg/m3", decimals=0, sheet="roof_density", width=16),
+            Column("correction_m3", unit, decimals=least, sheet="roof_correction", width=16,
+                   in_sheet={"unit": "m3", "decimals": LITRE_DECIMALS}),
+        ),
+        rows=lambda record: record.get("roof_corrections") or [],
+    )  # fmt: skip
+
+
 # ---- proportional parts: volume of additional millimetres in a centimetre table
 
 

@@ -1,6 +1,12 @@
 """The capacity table of the certificate, with the coverage interval of each row."""
 
-from tankcal.report.tables.capacity import NOT_FOR_USE, capacity_rows, capacity_table
+from tankcal.report.tables.capacity import (
+    NOT_FOR_USE,
+    capacity_rows,
+    capacity_table,
+    high_legs_table,
+    roof_corrections_table,
+)
 from tankcal.report.uncertainty.stated import flag_simulated, uneven_rows
 
 MOST_ACROSS, MOST_ACROSS_OF_DENSITIES = 4, 5  # largest number of parts side by side
@@ -46,6 +52,23 @@ def density_blocks(paper):
         across = times_across(paper, rows, columns, most=MOST_ACROSS_OF_DENSITIES)
         blocks.append(paper.show(table, rows, on=name, across=across, density=density))
     return blocks
+
+
+def roof_blocks(paper):
+    """Tables of the roof on high legs, and of its corrections by density; [] without a roof."""
+    record, shown = paper.record, []
+    if rows := record.get("on_high_legs"):
+        table = high_legs_table(record)
+        across = times_across(paper, rows, table.on_paper(None, rows))
+        ends = {key: paper.height(rows[at]["height_m"]) for key, at in (("low", 0), ("high", -1))}
+        shown.append(paper.paragraph("not_for_use_marked", mark=NOT_FOR_USE))
+        shown.append(paper.show(table, rows, across=across, coverage=paper.coverage(), **ends))
+    if record.get("roof_corrections"):
+        details = {size["code"]: size["value"] for size in record["roof"]}
+        density = paper.number(details["roof_reference_density"], "kg/m3", digits=4)
+        table = roof_corrections_table(record)
+        shown.append(paper.show(table, table.rows(record), across=4, density=density))
+    return shown
 
 
 def times_across(paper, rows, columns, most=MOST_ACROSS):

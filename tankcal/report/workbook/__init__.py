@@ -12,6 +12,7 @@ from tankcal.report.workbook.capacity import (
     densities_sheet,
     millimetres_sheet,
     proportional_parts_sheet,
+    roof_sheet,
 )
 from tankcal.report.workbook.certificate import certificate_sheet
 from tankcal.report.workbook.charts import charts_sheets
@@ -85,6 +86,7 @@ def _sheets_of_tank(book, record):
     rows = capacity_sheet(book, record)
     proportional_parts_sheet(book, record)
     densities_sheet(book, record)
+    roof_sheet(book, record)
     millimetres_sheet(book, record)
     calculator_sheets(book, record)
     quantity_sheets(book, record)

@@ -4,7 +4,13 @@ from bisect import bisect_right
 from dataclasses import dataclass, replace
 from math import ceil, floor
 
-from tankcal.report.tables.capacity import capacity_rows, capacity_table, parts_table
+from tankcal.report.tables.capacity import (
+    capacity_rows,
+    capacity_table,
+    high_legs_table,
+    parts_table,
+    roof_corrections_table,
+)
 from tankcal.report.uncertainty.sources import critical_zone
 from tankcal.report.uncertainty.stated import stated_U_m3
 from tankcal.report.workbook.look import CRITICAL, Column, width_of, width_of_lines
@@ -113,6 +119,24 @@ def densities_sheet(book, record):
     book.freeze(sheet, HEAD_ROW)
     for place in range(2, 1 + len(tables)):
         book.name(name_of_density(place), sheet, HEAD_ROW + 1, last, place)
+
+
+def roof_sheet(book, record):
+    """Write the rows on high legs and the corrections by density; no sheet without a roof."""
+    tables = [
+        (name, table(record))
+        for name, table in (
+            ("on_high_legs", high_legs_table),
+            ("roof_corrections", roof_corrections_table),
+        )
+        if record.get(name)
+    ]
+    if tables:
+        sections = [
+            cell_table(book, table, name=name, title=book.word(f"headings.{name}"))
+            for name, table in tables
+        ]
+        write_sheet(book, SheetContent("floating_roof", sections, tab="result"))
 
 
 def name_of_density(place):
