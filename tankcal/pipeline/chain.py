@@ -279,7 +279,7 @@ def _list_corrections(job, survey, tabulation, supplement):
 
 
 def _table_on_high_legs(job, survey):
-    """`Capacity` with the legs of a floating roof in their high position; None: a single position."""
+    """`Capacity` with the legs of a floating roof in their high position, or None."""
     roof = job.roof
     if roof is None or not job.switches.roof or roof.high_critical_bottom_m is None:
         return None
