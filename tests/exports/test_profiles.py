@@ -2,10 +2,13 @@
 
 from fractions import Fraction
 
+import numpy as np
 import pytest
+from exported_records import exact_record, lying
 
 from tankcal.errors import InputError
 from tankcal.job.tables import Log
+from tankcal.products.exports.exporting import export_record
 from tankcal.products.exports.profiles import find_profile, parse_profile, shipped_profiles
 from tankcal.products.exports.writing import count_increments, to_quanta
 from tankcal.tank.dips import parse_dip
@@ -40,7 +43,7 @@ def test_limits_of_shipped_profiles():
         "veeder-root-tls-20": 20,
     }  # fmt: skip
     not_read = {code for code, one in shipped_profiles().items() if not one.verified}
-    assert not_read == {"veeder-root-tls-20", "csv"}
+    assert not_read == {"csv"}
 
 
 def test_increments():
@@ -121,3 +124,23 @@ def test_files_that_are_no_profile(data, tmp_path):
 def test_names_without_a_profile(name):
     with pytest.raises(InputError):
         find_profile(name)
+
+
+def test_fixed_levels_of_a_console(tmp_path):
+    """Closed form of a lying cylinder at 5, 10, ... 100 % of its diameter; no level is chosen."""
+    source = exact_record(tmp_path, lying, np.arange(0, 2.4001, 0.01))
+    export = export_record(source, find_profile("veeder-root-tls-20"))
+    top = max(export.dip_m)
+    assert sorted(export.dip_m) == pytest.approx([top * k / 20 for k in range(1, 21)], abs=1e-5)
+    exact = [lying(dip) for dip in export.dip_m]
+    assert export.volume_m3 == pytest.approx(exact, abs=export.error_m3)
+    between = np.linspace(0, top, 2001)
+    read = np.interp(between, [0, *sorted(export.dip_m)], [0, *sorted(export.volume_m3)])
+    worst = np.max(np.abs(read - [lying(dip) for dip in between]))
+    assert 0.9 * export.error_m3 < worst <= export.error_m3 + 5e-4
+    with pytest.raises(InputError):
+        export_record(source, find_profile("veeder-root-tls-20"), points=10)
+
+
+def test_parts_belong_to_fractions():
+    assert "table.parts" in told(GOOD.replace("[table]", "[table]\nparts = 20"))

@@ -231,7 +231,7 @@ def export_record(source, profile, *, points=None, max_error_m3=None, hangs_on_s
         tank=record.job.tank.id,
         dip_m=marks.at_m[listed],
         volume_m3=marks.written_m3[listed],
-        rows=len(height),
+        rows=len(record.capacity.height_m),
         error_m3=error + request.interpolation_m3,
         at_m=at,
         interpolation_m3=request.interpolation_m3,

@@ -50,8 +50,10 @@ FIELDS = {
         Field("remark", "text", "anything that is to stand beside it"),
     ),
     "table": (
-        choice("grid", "which rows", ("every row", "step", "breakpoints"), required=True),
+        choice("grid", "which rows", ("every row", "step", "fractions", "breakpoints"),
+               required=True),
         number("step_m", "from row to row, where grid is step", 0, 100, above_low=True),
+        number("parts", "equal parts of the highest dip, where grid is fractions", 2, MOST_POINTS),
         number("min_points", "fewest rows that the system takes", 1, MOST_POINTS),
         number("max_points", "most rows that the system takes", 1, MOST_POINTS),
         choice("interpolation", "how the system reads between rows", ("linear", "spline")),
@@ -96,6 +98,8 @@ class Profile:
         Name of the profile's file without its extension.
     step_m : float or None
         Step between rows, if grid is "step".
+    parts : int or None
+        Number of equal parts of the highest dip, if grid is "fractions".
     min_points, max_points : int or None
         None: no known limit.
     largest : float or None
@@ -112,6 +116,7 @@ class Profile:
     verified: bool = False
     remark: str = ""
     step_m: float | None = None
+    parts: int | None = None
     min_points: int | None = None
     max_points: int | None = None
     interpolation: str = "linear"
@@ -308,8 +313,11 @@ def _check_table(values, tell):
         tell("table", "step_m", text)
     if grid != "step" and step is not None:
         tell("table", "step_m", message("export_step", "given where grid is not step; remove it"))
-    wholes = (("table", "min_points"), ("table", "max_points"), ("levels", "decimals"),
-              ("volumes", "decimals"), ("volumes", "digits"))  # fmt: skip
+    if (grid == "fractions") != (values["table", "parts"] is not None):
+        text = message("export_parts", "expected with grid = 'fractions', and only there")
+        tell("table", "parts", text)
+    wholes = (("table", "parts"), ("table", "min_points"), ("table", "max_points"),
+              ("levels", "decimals"), ("volumes", "decimals"), ("volumes", "digits"))  # fmt: skip
     for section, key in wholes:
         value = values[section, key]
         if value is not None and value != int(value):
@@ -417,9 +425,9 @@ _TEXTS = (
     ),
     message("profile_every_row", "Every row, decimal point, comma"),
     message(
-        "profile_unfit",
-        "Does not fit a console of 20 points: such a console takes volumes only, at 5, 10, ... 100 "
-        "% of the diameter. Enter volumes at those heights from the table",
+        "profile_fractions",
+        "Enter the highest dip as the diameter (function 607) and the volumes only (function 606): "
+        "the console takes them at 5, 10, ... 100 % of the diameter",
     ),
     message("profile_any", "any program that reads CSV"),
     message("profile_russian", "a Russian level meter"),
@@ -432,6 +440,9 @@ _TEXTS = (
     message("profile_tls", "Veeder-Root TLS (20 points)"),
     message("profile_arts", "ARTS retail data model"),
     message("profile_own_choice", "own choice of tankcal"),
-    message("profile_from_memory", "from memory: 1, 4 or 20 points"),
+    message(
+        "profile_tls_manual",
+        "Serial Interface Manual 576013-635, revision U, functions 606 and 607",
+    ),
 )
 _MESSAGES = {str(text): text for text in _TEXTS}

@@ -305,8 +305,23 @@ class RowRequest:
         self.interpolation_m3 = (
             0.0 if record.interpolation is None else record.interpolation.largest_m3
         )
+        self.fraction_rows = ()
+        if profile.grid == "fractions":
+            self._insert_fractions()
         self.has_zero = abs(self.height[0]) <= ZERO_M
         self.is_zero_left_out = self.has_zero and profile.zero_row == "forbidden"
+
+    def _insert_fractions(self):
+        """Add a row at each equal part of the highest dip, on the straight line between its rows.
+
+        The error of straight lines between the rows of the table covers the added rows.
+        """
+        top, parts = self.height[-1], int(self.profile.parts)
+        wanted = top * np.arange(1, parts + 1) / parts
+        wanted = wanted[wanted >= self.height[0]]
+        height = np.union1d(self.height, wanted)
+        self.volume = np.interp(height, self.height, self.volume)
+        self.height, self.fraction_rows = height, tuple(np.searchsorted(height, wanted).tolist())
 
     def report(self, text, key):
         """Report a problem of a key of the profile, or of an option."""
@@ -338,7 +353,7 @@ class RowRequest:
 
     def _find_required_rows(self):
         """Required rows: the ends, and rows about the critical zone of a roof."""
-        required = {0, len(self.height) - 1}
+        required = {0, len(self.height) - 1, *self.fraction_rows}
         for_use = np.array(self.record.capacity.for_use, dtype=bool)
         if len(for_use) == len(self.height):
             edges = np.flatnonzero(np.diff(for_use.astype(int)))
@@ -355,6 +370,8 @@ class RowRequest:
             if grid == "every row":
                 rows = _drop_shifted_top(marks, np.flatnonzero(marks.permitted), self.height)
                 table_rows = slice(int(rows[-1]) + 1)  # the file states no volume above its top
+            elif grid == "fractions":
+                rows, table_rows = np.array(required), slice(None)
             else:
                 rows, table_rows = self._steps(marks), slice(None)
             if len(rows) < 2:
@@ -374,6 +391,10 @@ class RowRequest:
 
     def _breakpoints(self, marks, required):
         """Return the `Breakpoints` of the request; None after reporting why there are none."""
+        if self.profile.grid == "fractions":
+            text = message("export_fixed", "the system has fixed levels; leave out --points and "
+                           "--max-error-l")  # fmt: skip
+            return self.report(text, "table.grid")
         # A required first row that the file omits does not count as a point.
         more = int(self.is_zero_left_out)
         most = self.profile.max_points
