@@ -24,7 +24,7 @@ def _docs(options):
     names, folder = page_names(), shipped_folder("docs")
     if options.page is None:
         for name in names:
-            print(f"{name:24}{_title(folder / f'{name}.md')}".rstrip())
+            print(f"{name:28} {_title(folder / f'{name}.md')}".rstrip())
         print(folder)
         return
     name = options.page.removeprefix("docs/").removesuffix(".md")

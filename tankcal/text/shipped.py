@@ -26,8 +26,11 @@ def shipped_folder(name):
 
 
 def page_names():
-    """Return the names of the pages of documentation in alphabetical order."""
-    return tuple(sorted(path.stem for path in shipped_folder("docs").glob("*.md")))
+    """Return the names of the pages of documentation, the studies last ("studies/coverage")."""
+    folder = shipped_folder("docs")
+    pages = sorted(path.stem for path in folder.glob("*.md"))
+    studies = sorted(path.stem for path in folder.glob("studies/*.md"))
+    return (*pages, *(f"studies/{name}" for name in studies))
 
 
 def nearest_language(given):

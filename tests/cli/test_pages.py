@@ -13,9 +13,17 @@ DOCS = Path(__file__).parents[2] / "docs"
 def test_every_page_is_listed_with_its_title(capsys):
     assert main(["docs"]) == 0
     *lines, folder = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines] == sorted(path.stem for path in DOCS.glob("*.md"))
+    names = [line.split()[0] for line in lines]
+    pages = sorted(path.stem for path in DOCS.glob("*.md"))
+    studies = sorted(path.stem for path in DOCS.glob("studies/*.md"))
+    assert names == [*pages, *(f"studies/{name}" for name in studies)]
     assert all(len(line.split()) > 1 for line in lines)
     assert Path(folder) == DOCS
+
+
+def test_a_study_is_printed(capsys):
+    assert main(["docs", "studies/coverage"]) == 0
+    assert capsys.readouterr().out.startswith("# Study: coverage")
 
 
 @pytest.mark.parametrize("name", ["limits", "limits.md", "docs/limits.md"])
