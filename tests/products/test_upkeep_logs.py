@@ -164,7 +164,7 @@ def test_historian_export(tmp_path):
     )
     text = "".join(f"02.06.2025 00:0{i}:00;{row}\n" for i, row in enumerate(rows))
     file = open_log(tmp_path, "Zeit;Tag;Wert;Status\n" + text, profile="pi.toml")
-    sums = LevelSums(np.array([[START - SECOND, START + 3600 * SECOND]]), 1e-4, (), np.ones_like)
+    sums = LevelSums(np.array([[START - SECOND, START + 3600 * SECOND]]), 1e-4, (), np.asarray)
     sums.read([file])
     assert sums._sums["n"].sum() == 1
     assert sums._reference[0] == pytest.approx(1.2345)
@@ -245,7 +245,7 @@ def test_stuck_float(tmp_path):
         (np.r_[np.full(70, 1000.0), np.full(170, 950.0)], 0),
     ):
         file = quiet_log(tmp_path, level)
-        sums = LevelSums(windows, 1e-4, flows, lambda level: np.full(np.shape(level), 10.0))
+        sums = LevelSums(windows, 1e-4, flows, lambda level: 10 * np.asarray(level))
         sums.read([file])
         pieces = sums.means(file.findings)
         assert (len(pieces) == 0) == bool(stuck)
@@ -262,7 +262,7 @@ def test_sums_do_not_depend_on_chunks(tmp_path, monkeypatch, chunk):
     lines.insert(60, lines[59])
     lines.insert(80, lines[79].split(",")[0] + ",1.0")
     file.path.write_text("\n".join(lines) + "\n")
-    sums = LevelSums(np.array([[START - 1, START + 9000 * SECOND]]), 1e-5, (), np.ones_like)
+    sums = LevelSums(np.array([[START - 1, START + 9000 * SECOND]]), 1e-5, (), np.asarray)
     sums.read([file])
     pieces = sums.means(file.findings)
     assert pieces.count.sum() in (98, 99)

@@ -27,12 +27,12 @@ class TrueTank:
     volume: np.ndarray = field(init=False)
 
     def __post_init__(self):
-        x = np.linspace(-self.end, self.length + self.end, 2001)
+        x = np.linspace(-self.end, self.length + self.end, 601)
         out = np.maximum(np.maximum(-x, x - self.length), 0.0) / max(self.end, 1e-9)
         local = np.sqrt(np.clip(1 - out**2, 0, 1))  # ellipsoidal ends
         rings = self.ring * np.where((x // 1.4) % 2 < 1, 1.0, -1.0)
         radius = (self.radius + rings) * local
-        self.grid = np.linspace(0.0, 2 * self.radius, 2501)
+        self.grid = np.linspace(0.0, 2 * self.radius, 1001)
         depth = self.grid[:, None] + self.zero + self.tilt * (self.length / 2 - x) - self.radius
         depth = depth / (1 - self.flat / self.radius)
         share = np.clip(depth / np.maximum(radius, 1e-9), -1, 1)

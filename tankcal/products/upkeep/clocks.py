@@ -3,6 +3,9 @@
 import numpy as np
 import pandas as pd
 
+MOST_OFFSET_S, OFFSET_STEP_S = 7200, 30  # searched offsets of two clocks
+LEAST_SALES = 30  # for an offset
+MOST_STEP_M3 = 0.3  # change of the stock in a row beyond it: a delivery
 SWITCH_NS = 900 * 10**9  # smallest fall of a local time that is the change of the clock
 NOT_A_TIME = np.iinfo(np.int64).min  # NaT as an integer
 
@@ -70,3 +73,37 @@ class LocalClock:
         times = pd.DatetimeIndex(local_ns.view("datetime64[ns]"))
         marked = times.tz_localize(self.zone, ambiguous="NaT", nonexistent="shift_forward")
         return (marked.asi8 == NOT_A_TIME) & (local_ns != NOT_A_TIME)
+
+
+def find_offset_s(time_ns, stock_m3, flows):
+    """Estimate how late the clock of a level log is, by falls of the level and metered volumes.
+
+    Stock and metered volume have a constant sum between deliveries. The sum of the absolute changes
+    from row to row is least at the right offset.
+
+    Parameters
+    ----------
+    time_ns : ndarray of int64, shape (n,)
+        Ascending.
+    stock_m3 : ndarray, shape (n,)
+    flows : sequence of flows.MeterFlow
+
+    Returns
+    -------
+    float or None
+        Seconds; None with too few sales.
+    """
+    offsets = np.arange(-MOST_OFFSET_S, MOST_OFFSET_S + 1, OFFSET_STEP_S)
+    change, sums, sales = np.diff(stock_m3), np.zeros(len(offsets)), 0
+    middles = []
+    for flow in flows:
+        middle = flow.begin_ns // 2 + flow.time_ns // 2
+        sales += int(np.sum((middle > time_ns[0]) & (middle < time_ns[-1])))
+        middles.append((np.sort(middle), flow.total_m3))
+    if sales < LEAST_SALES:
+        return None
+    for place, offset in enumerate(offsets):
+        at = time_ns - int(offset) * 10**9
+        sold = sum(total[np.searchsorted(middle, at)] for middle, total in middles)
+        sums[place] = np.minimum(np.abs(change + np.diff(sold)), MOST_STEP_M3).sum()
+    return float(offsets[np.argmin(sums)])

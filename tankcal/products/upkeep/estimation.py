@@ -5,8 +5,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.stats
 
-from tankcal.errors import InputError, Problem
-from tankcal.messages import message
 from tankcal.products.upkeep.causes import Balance
 from tankcal.products.upkeep.filtering import (
     Triangle,
@@ -41,6 +39,8 @@ class Estimation:
     rejected : ndarray of int
         Steps rejected as outliers.
     passes : int
+    is_fitting : bool
+        False: more steps than `MOST_REJECTED` are outliers; no step was rejected.
     """
 
     steps: object
@@ -50,6 +50,7 @@ class Estimation:
     innovations: np.ndarray
     rejected: np.ndarray
     passes: int
+    is_fitting: bool = True
 
     @property
     def is_used(self):
@@ -91,11 +92,6 @@ def estimate(operation, steps, *, is_robust=True):
     Returns
     -------
     Estimation
-
-    Raises
-    ------
-    InputError
-        If more than 2 % of the steps are outliers: the model does not fit the tank.
     """
     rejected, balance, triangle, smoothed = [], None, None, None
     passes = 0
@@ -107,7 +103,11 @@ def estimate(operation, steps, *, is_robust=True):
         balance = _exclude_steps(balance, rejected)
         whitened, triangle = _solve(balance)
         if is_robust:
-            balance, whitened, triangle, rejected = _reject(balance, whitened, triangle, rejected)
+            robust = _reject(balance, whitened, triangle, rejected)
+            if robust[3] is None:
+                # The model does not fit: all steps are used, so that a fault shows in the watching.
+                return replace(estimate(operation, steps, is_robust=False), is_fitting=False)
+            balance, whitened, triangle, rejected = robust
         residual = balance.misclosure_m3 - balance.columns_m3 @ triangle.estimate
         smoothed = whiten_steps(balance.drift, residual[:, None], is_smoothed=True).smoothed
         if before is not None:
@@ -137,7 +137,7 @@ def _exclude_steps(balance, rejected):
 
 
 def _reject(balance, whitened, triangle, rejected):
-    """Reject the steps with |w| above the limit, the largest first."""
+    """Reject the steps with |w| above the limit, the largest first; None with too many of them."""
     most = int(MOST_REJECTED * balance.drift.is_used.sum()) + 1
     while True:
         residual = whitened.rows[:, 0] - whitened.rows[:, 1:] @ triangle.estimate
@@ -155,11 +155,6 @@ def _reject(balance, whitened, triangle, rejected):
                 group.append(int(step))
         rejected = [*rejected, *group]
         if len(rejected) > most:
-            text = message("upkeep_model_does_not_fit", "{count} of {steps} steps are outliers "
-                           "(|w| over {limit:g}); expected at most {share:.0f} %: the model "
-                           "does not fit this tank", count=len(rejected),
-                           steps=len(balance.misclosure_m3),
-                           limit=OUTLIER, share=100 * MOST_REJECTED)  # fmt: skip
-            raise InputError(Problem("upkeep.toml", text))
+            return balance, whitened, triangle, None
         balance = _exclude_steps(balance, rejected)
         whitened, triangle = _solve(balance)

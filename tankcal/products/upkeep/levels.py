@@ -4,11 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.products.upkeep.clocks import NOT_A_TIME
+from tankcal.products.upkeep.clocks import NOT_A_TIME, find_offset_s
 
 PIECE_NS = 3600 * 10**9  # longest piece of a quiet window
 STUCK_STEPS = 8  # movement of the level, in quanta, that a stuck float has missed
 LINE_ROWS, LINE_M = 6, 1e-9  # a straight line through so many rows is an interpolation
+CLOCK_ROWS = 4000  # rows of a chunk by which the clocks are compared
+MOST_OFFSET_S = 60.0  # between two clocks; a larger offset causes a warning
 OVERLAP = 400_000  # rows in which a late row is compared with earlier rows
 
 
@@ -70,13 +72,19 @@ class LevelSums:
     quantum_m : float
         Smallest step of the indication.
     flows : sequence of flows.MeterFlow
-    area_m2 : callable
-        Area of the liquid surface at levels, for the movement that a stuck float has missed.
+    volume_m3 : callable
+        Volume of the table at levels.
+
+    Attributes
+    ----------
+    offsets : list of (int, float)
+        Time and offset in seconds of the clock of the levels from the clock of the meters.
     """
 
-    def __init__(self, windows, quantum_m, flows, area_m2):
+    def __init__(self, windows, quantum_m, flows, volume_m3):
         self.pieces, self.window = divide_windows(windows)
-        self.quantum_m, self.flows, self.area_m2 = quantum_m, flows, area_m2
+        self.quantum_m, self.flows, self.volume_m3 = quantum_m, flows, volume_m3
+        self.offsets = []
         count = len(self.pieces)
         self._reference = np.full(count, np.nan)
         self._sums = {name: np.zeros(count) for name in ("n", "h", "hh", "t", "T", "nT", "w", "nw")}
@@ -103,6 +111,7 @@ class LevelSums:
                           zip(recent, (time[is_level & is_new], level[is_level & is_new]),
                               strict=True)]  # fmt: skip
                 run = self._follow_runs(time[is_level], level[is_level], run)
+                self._compare_clocks(time[is_level], level[is_level], file)
                 is_line = np.zeros(len(time), dtype=bool)
                 is_line[is_level] = find_lines(time[is_level], level[is_level])
                 file.findings.add("levels", "interpolated", time[is_line])
@@ -149,10 +158,25 @@ class LevelSums:
         flow = np.zeros(len(start))
         for meter in self.flows:
             flow += meter.volume_m3(end) - meter.volume_m3(start)
-        missed = STUCK_STEPS * max(self.quantum_m, 1e-4) * self.area_m2(value)
+        missed = (
+            STUCK_STEPS
+            * max(self.quantum_m, 1e-4)
+            * ((self.volume_m3(value + 1e-3) - self.volume_m3(value - 1e-3)) / 2e-3)
+        )
         for place in np.flatnonzero(flow[:closed] > missed[:closed]):
             self._stuck.append((int(start[place]), int(end[place])))
         return None if time is None or not len(start) else (start[-1], end[-1], value[-1])
+
+    def _compare_clocks(self, time, level, file):
+        """Compare the clocks of levels and meters by the first rows of a chunk."""
+        time, level = time[:CLOCK_ROWS], level[:CLOCK_ROWS]
+        if len(time) < 2:
+            return
+        offset = find_offset_s(time, self.volume_m3(level), self.flows)
+        if offset is not None:
+            self.offsets.append((int(time[0]), offset))
+            if abs(offset) > MOST_OFFSET_S + np.median(np.diff(time)) * 0.5e-9:
+                file.findings.add("levels", "clock_offset", time[[0, -1]], len(time))
 
     def _add(self, chunk, is_used):
         """Add readings to the sums of their pieces."""

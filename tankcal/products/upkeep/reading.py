@@ -19,7 +19,7 @@ from tankcal.products.quantity.table import read_table
 from tankcal.products.settings import fill_blanks, read_sections
 from tankcal.products.upkeep.causes import PRIORS, Meter, Operation, TableStock
 from tankcal.products.upkeep.flows import quiet_windows, read_flows
-from tankcal.products.upkeep.levels import LevelSums
+from tankcal.products.upkeep.levels import MOST_OFFSET_S, LevelSums
 from tankcal.products.upkeep.logs import Findings, LogFile
 from tankcal.products.upkeep.profiles import read_log_profile
 from tankcal.products.upkeep.steps import REASONS, StepRules, Tickets, build_steps
@@ -273,11 +273,7 @@ def _build(sections, table, meters, files, findings, sources, log):
     first = min(flow.begin_ns.min() for flow in flows if len(flow.time_ns)) - span
     last = max(flow.time_ns.max() for flow in flows if len(flow.time_ns)) + span
     windows = quiet_windows(flows, rules["settle_s"], first, last)
-
-    def area_m2(level):
-        return (table.volume(level + 1e-3) - table.volume(level - 1e-3)) / 2e-3
-
-    sums = LevelSums(windows, quantum, flows, area_m2)
+    sums = LevelSums(windows, quantum, flows, table.volume)
     sums.read(files["levels"])
     log.stop_if_problems()
     pieces = sums.means(findings)
@@ -293,6 +289,12 @@ def _build(sections, table, meters, files, findings, sources, log):
         text = message("upkeep_no_steps", "no step between two quiet levels; expected levels "
                        "before and after sales, in a common time zone")  # fmt: skip
         raise InputError(Problem(files["levels"][0].path.name, text))
+    if findings.number("levels", "clock_offset"):
+        offset = max((offset for _, offset in sums.offsets), key=abs)
+        text = message("upkeep_clock", "the clock of the levels is {offset:.0f} s late against the "
+                       "meters (negative: early); expected at most {most:.0f} s", offset=offset,
+                       most=MOST_OFFSET_S)  # fmt: skip
+        log.warning(files["levels"][0].path.name, text, column="time")
     _judge_cleaning(findings, files["levels"][0].path.name, log)
     log.stop_if_problems()
     operation = Operation(

@@ -38,11 +38,6 @@ def keep_up(inputs):
     Returns
     -------
     saved.UpkeepFile
-
-    Raises
-    ------
-    InputError
-        If the model does not fit the tank.
     """
     sections, operation = inputs.sections, inputs.operation
     warnings = list(inputs.warnings)
@@ -69,7 +64,7 @@ def keep_up(inputs):
     seen = (table.height_m >= low) & (table.height_m <= high)
     reasons = _refusals(estimation, table, low, high, former_u, seen, inputs.traceable)
     mode = "improved"
-    if {"few_steps", "small_range", "global_test"} & set(reasons):
+    if {"few_steps", "small_range", "global_test", "outliers"} & set(reasons):
         mode = "watched"
     elif "wide_former" in reasons:
         mode = "deliveries"
@@ -181,6 +176,8 @@ def _refusals(estimation, table, low, high, former_u, seen, traceable):
         reasons.append("few_steps")
     if high - low < LEAST_RANGE * np.ptp(table.height_m):
         reasons.append("small_range")
+    if not estimation.is_fitting:
+        reasons.append("outliers")
     if estimation.probability < GLOBAL_TEST:
         reasons.append("global_test")
     if np.any(seen) and np.median(former_u[seen] / table.volume_m3[seen]) > WIDE:

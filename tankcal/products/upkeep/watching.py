@@ -133,17 +133,21 @@ def watch(estimation, false_alarm_per_year=0.05):
     rng = np.random.default_rng(SEED)
     by_model = _largest(effects, root, edges, rng.normal(size=(DRAWS, len(end))) * is_used)
     limit = limit_of_model = float(np.quantile(by_model, share))
-    limit_of_tank, false_alarms = None, None
-    if days >= LEAST_TANK_DAYS:
-        blocks = _draw_blocks(innovations, end, rng, DRAWS // 4)
+    limit_of_tank, false_alarms, size_of = None, None, np.abs(w).max(axis=1)
+    # A fault must not raise its limit: after a |w| that no valid tank has, only the innovations
+    # before the first suspicion are drawn.
+    pool = len(end)
+    if np.any(size_of > PROVISIONAL * limit_of_model):
+        pool = int(edges[np.argmax(size_of > limit_of_model)])
+    if end[pool - 1] >= LEAST_TANK_DAYS * DAY_S:
+        blocks = _draw_blocks(innovations, end, pool, rng, DRAWS // 4)
         by_tank = _largest(effects, root, edges, blocks)
         limit_of_tank = float(np.quantile(by_tank, share))
         limit = max(limit, limit_of_tank)
         false_alarms = float(np.mean(by_tank > limit))
     else:
         limit = PROVISIONAL * limit
-    size_of = np.abs(w)
-    alarms = np.flatnonzero(size_of.max(axis=1) > limit)
+    alarms = np.flatnonzero(size_of > limit)
     alarm_s = float(end[edges[alarms[0]] - 1]) if len(alarms) else None
     suspects = _suspects(kinds, w[-1], root[-1])
     names, is_named = (), False
@@ -221,11 +225,11 @@ def _largest(effects, root, edges, draws):
     return np.maximum(largest, np.max(np.abs(draws), axis=1, initial=0.0))
 
 
-def _draw_blocks(innovations, end, rng, count):
-    """Innovations (count, n) of random blocks of fourteen days, with their signs."""
+def _draw_blocks(innovations, end, pool, rng, count):
+    """Innovations (count, n) of random blocks of fourteen days of the first `pool` steps."""
     length = np.searchsorted(end, end[0] + BLOCK_DAYS * DAY_S)
     blocks = int(np.ceil(len(innovations) / length))
-    begin = rng.integers(0, len(innovations) - length + 1, size=(count, blocks))
+    begin = rng.integers(0, pool - length + 1, size=(count, blocks))
     sign = rng.choice([-1.0, 1.0], size=(count, blocks))
     drawn = innovations[begin[:, :, None] + np.arange(length)] * sign[:, :, None]
     return drawn.reshape(count, -1)[:, : len(innovations)]

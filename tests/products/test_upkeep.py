@@ -1,0 +1,236 @@
+"""Upkeep of stations: bias, new tables, planted faults, clocks, and the command.
+
+Kind of truth: simulation by stations and years that are not the model; closed forms.
+"""
+
+import json
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import EXAMPLE
+from numpy.testing import assert_allclose
+from station_years import draw_year, make_table
+from stations import Station, TrueTank, write_station
+
+from tankcal import cli
+from tankcal.products.quantity.table import TankTable, read_table
+from tankcal.products.upkeep.causes import PRIORS, Operation, TableStock
+from tankcal.products.upkeep.clocks import find_offset_s
+from tankcal.products.upkeep.estimation import estimate
+from tankcal.products.upkeep.flows import MeterFlow
+from tankcal.products.upkeep.steps import Marks, Steps
+from tankcal.products.upkeep.upkeep import _error_ratio, update_table
+from tankcal.products.upkeep.watching import watch
+
+START = np.datetime64("2025-01-06T00:00:00", "ns").astype(np.int64)
+
+
+# ---- bias of the scale
+
+
+def move_liquid(rng, *, steps=2000, area_m2=10.0):
+    """Steps of 0.5 m3 down and up a straight tank; (operation, steps, true relative scale)."""
+    scale, factor = 0.005 * rng.normal(), 0.0015 * rng.normal()
+    sold = np.where((np.arange(steps) // 500) % 2 == 0, 0.5, -0.5)
+    inside = 280 * (1 + scale) - np.append(0, np.cumsum(sold * (1 + factor)))
+    read = inside / (area_m2 * (1 + scale)) + 2e-4 * rng.normal(size=steps + 1)
+    height = np.array([0.0, 30.0])
+    volume = area_m2 * height
+    table = TankTable(
+        "t", "vertical", height, volume, 0.005 * volume[:, None], np.full(2, np.inf), 0.0, 15.0, 0.0
+    )
+    marks = Marks(np.arange(steps + 1) * 3600 * 10**9, read, np.zeros(steps + 1),
+                  np.full(steps + 1, 15.0))  # fmt: skip
+    blank, none = np.full(steps, np.nan), np.zeros(steps, dtype=int)
+    priors = dict.fromkeys(PRIORS["station"], 0.0) | {
+        "gauge_wander_days": 5.0, "layer_h": 12.0, "meter_percent": 0.15, "level_mm": 0.2,
+    }  # fmt: skip
+    tank = Steps(marks, ("m",), sold[:, None], blank[:, None], np.zeros(steps), blank, none, none)
+    return Operation(TableStock(table, 0.0, 15.0), {}, priors), tank, scale
+
+
+@pytest.mark.slow
+def test_scale_has_no_bias():
+    """2000 steps, levels 2 L, scale 0.5 %, meter 0.15 %: u 1437 ppm, mean error zero.
+
+    Columns at the levels as read make it -n u^2, that is -2.9 u.
+    """
+    errors, stated = [], []
+    for seed in range(20):
+        operation, steps, scale = move_liquid(np.random.default_rng(seed))
+        estimation = estimate(operation, steps, is_robust=False)
+        size, u = estimation.sizes()
+        stated.append(0.005 * u[0])
+        errors.append((0.005 * size[0] - scale) / (0.005 * u[0]))
+    assert np.mean(stated) == pytest.approx(1437e-6, rel=5e-3)
+    assert abs(np.mean(errors)) < 3 / np.sqrt(len(errors))
+
+
+# ---- new table
+
+
+@pytest.fixture(scope="module")
+def table():
+    return make_table()
+
+
+def test_change_is_judged_by_the_difference_of_squares():
+    """U 0.60 before and 0.46 after: a change of 0.385 has E_n 1."""
+    assert _error_ratio(0.385, 0.60, 0.46) == pytest.approx(1.0, abs=1e-3)
+    assert _error_ratio(0.1, 0.60, 0.60) is None
+
+
+def test_new_table_keeps_covariance_outside(table):
+    """Increments above the levels keep the former covariance; inside it is C P C'."""
+    year = draw_year(np.random.default_rng(2), table, days=25)
+    estimation = estimate(year.operation, year.steps)
+    low, high = 0.9, 1.3
+    volume, factor = update_table(estimation, year.operation.stock, low, high)
+    stock, new = year.operation.stock, replace(table, volume_m3=volume, factor_m3=factor)
+    above = np.array([high, 2.2])
+    former = np.linalg.norm(np.diff(table.factor(above), axis=0))
+    # The increment has C x - C x' = (C - C') x, and x keeps its prior covariance.
+    assert np.linalg.norm(np.diff(new.factor(above), axis=0)) == pytest.approx(former, rel=1e-9)
+    assert_allclose(np.diff(new.volume(above)), np.diff(table.volume(above)), rtol=1e-12)
+    inside = np.array([1.0, 1.2])
+    count = len(stock.names)
+    columns = stock.columns(inside, np.zeros(count))
+    expected = columns @ estimation.covariance[:count, :count] @ columns.T
+    assert_allclose(new.factor(inside) @ new.factor(inside).T, expected, rtol=1e-8)
+    ratio = new.volume(np.array([0.0, 0.4, low])) / table.volume(np.array([0.0, 0.4, low]))
+    assert_allclose(ratio, ratio[-1], rtol=1e-9)
+
+
+@pytest.mark.study
+def test_tables_deliveries_and_meters_hold(table):
+    """40 stations of 200 days: share within 95 % intervals, at least 88 % of 40."""
+    held = {"rows": [], "delivery": [], "meters": []}
+    for seed in range(40):
+        year = draw_year(np.random.default_rng(1000 + seed), table, days=200)
+        estimation = estimate(year.operation, year.steps)
+        levels = estimation.balance.level_m
+        volume, factor = update_table(estimation, year.operation.stock, levels.min(), levels.max())
+        new = replace(table, volume_m3=volume, factor_m3=factor)
+        rows = np.array([0.8, 1.1, 1.4])
+        error = new.volume(rows) - year.tank.below(rows)
+        held["rows"].append(np.abs(error) < 1.96 * np.linalg.norm(new.factor(rows), axis=1))
+        spread = np.linalg.norm(new.factor(rows[[-1]]) - new.factor(rows[[0]]))
+        held["delivery"].append(abs(error[-1] - error[0]) < 1.96 * spread)
+        causes, (size, u) = estimation.balance.causes, estimation.sizes()
+        place = causes.place("meter")
+        factors = np.array([year.factors[causes.names[i].removeprefix("meter ")] for i in place])
+        held["meters"].append(np.abs(size[place] / 100 - factors) < 1.96 * u[place] / 100)
+    share = {name: float(np.mean(values)) for name, values in held.items()}
+    print(share)
+    assert min(share.values()) > 0.88
+
+
+# ---- planted faults
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(
+    ("kind", "size", "unit"),
+    [("leak", 0.757, 1), ("zero", 0.003, 1000), ("meter", 0.01, 100), ("ticket", 0.02, 100)],
+)
+def test_planted_faults_are_named(table, kind, size, unit, seed):
+    """A fault of day 80 is found before day 120, and named, or named among the inseparable."""
+    year = draw_year(np.random.default_rng(seed), table, days=120, faults={kind: (80.0, size)})
+    watched = watch(estimate(year.operation, year.steps))
+    assert 79 < watched.alarm_s / 86400 < 119
+    suspect = next(cause for cause in watched.names if cause.kind == kind)
+    assert suspect.member in (None, "1")
+    assert abs(suspect.size - unit * size) < 4 * suspect.sd + 0.1 * unit * size
+    assert watched.is_named or len(watched.names) > 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [4, 5, 6])
+def test_years_without_a_fault_have_no_alarm(table, seed):
+    year = draw_year(np.random.default_rng(seed), table, days=120)
+    assert watch(estimate(year.operation, year.steps)).alarm_s is None
+
+
+@pytest.mark.parametrize("late_s", [0, 600, -300, 3600])
+def test_late_clock(late_s):
+    """Levels of a clock that is late, against sales: the offset is found to its grid."""
+    tank = TrueTank()
+    data = Station(days=4, tank=tank, period_s=120.0).run(np.random.default_rng(1))
+    begin, end, litres = (np.array([sale[i] for sale in data["sales"]]) for i in (0, 1, 3))
+    order = np.argsort(end)
+    flow = MeterFlow("all", *((1e9 * values[order]).astype(np.int64) for values in (end, begin)),
+                     np.append(0.0, np.cumsum(litres[order] / 1000)), np.zeros(len(end) + 1),
+                     np.zeros((0, 2), dtype=np.int64))  # fmt: skip
+    time, level = data["levels"]
+    found = find_offset_s((1e9 * (time + late_s)).astype(np.int64), tank.below(level), [flow])
+    assert found == pytest.approx(late_s, abs=60)
+
+
+# ---- the command
+
+
+@pytest.fixture(scope="module")
+def station(tmp_path_factory):
+    """Folder of a station with the tank of the example of rings, 40 days."""
+    place = tmp_path_factory.mktemp("upkeep")
+    shutil.copytree(EXAMPLE.parent / "rings", place / "rings")
+    assert cli.main(["run", str(place / "rings"), "--no-papers", "--quiet"]) == 0
+    record = place / "rings" / "results" / "record.json"
+    former = read_table(record)
+    tank = TrueTank()
+    tank.grid, tank.volume = former.height_m, former.volume_m3
+    data = Station(days=40, tank=tank, period_s=300.0).run(np.random.default_rng(7))
+    write_station(place / "station", data)
+    shutil.copy(record, place / "station")
+    return place / "station"
+
+
+@pytest.mark.slow
+def test_command_writes_and_reports(station, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert cli.main(["upkeep", str(station), "--out", str(out), "--quiet"]) == 0
+    saved = json.loads((out / "upkeep.json").read_text())
+    assert saved["mode"] == "watched"
+    assert saved["period"]["used"] > 100
+    assert saved["watch"]["alarm"] is None
+    assert {"upkeep.pdf", "upkeep.xlsx", "table.csv", "months.csv"} <= {
+        p.name for p in out.iterdir()
+    }
+    for language in ("es", "pt-BR"):
+        assert cli.main(["report", str(out), "--language", language, "--quiet"]) == 0
+    assert cli.main(["verify", str(out), "--quiet"]) == 0
+    capsys.readouterr()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("before", "after", "text"),
+    [
+        ('timezone = "UTC"\n', "", "timezone"),
+        ('"UTC"', '"Mars/Olympus"', "Mars/Olympus"),
+        ('files = ["levels.csv"]', 'files = ["levels.csv", "copy.csv"]', "levels.csv"),
+        ('files = ["levels.csv"]', 'files = ["none-*.csv"]', "none-"),
+        ('files = ["levels.csv"]', 'profile = "plane"\nfiles = ["levels.csv"]', "plain"),
+        ('record = "record.json"', 'record = "elsewhere"', "elsewhere"),
+    ],
+)
+def test_bad_input_is_one_line(station, tmp_path, capsys, before, after, text):
+    folder = tmp_path / "bad"
+    shutil.copytree(station, folder)
+    shutil.copy(folder / "levels.csv", folder / "copy.csv")
+    settings = folder / "upkeep.toml"
+    assert before in settings.read_text()
+    settings.write_text(settings.read_text().replace(before, after))
+    assert cli.main(["upkeep", str(folder), "--quiet"]) == 2
+    assert text in capsys.readouterr().err
+
+
+def test_empty_input_files(tmp_path, capsys):
+    for language in ("en", "es", "pt-BR"):
+        folder = tmp_path / language
+        assert cli.main(["upkeep", str(folder), "--new", "--language", language]) == 0
+        assert cli.main(["upkeep", str(folder), "--quiet"]) == 2
+    capsys.readouterr()
