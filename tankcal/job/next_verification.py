@@ -10,11 +10,12 @@ from tankcal.job.rule_files import find_rule
 from tankcal.messages import message
 
 _KEY = "certificate.next_verification_rule"
-_KINDS = {  # kinds of tank in the terms of the rules
-    "vertical": ("vertical_fixed_roof", "vertical_floating_roof"),
-    "horizontal": ("horizontal", "inclined"),
-    "sphere": ("sphere",),
-    "mesh": ("other",),
+_LYING = ("horizontal", "inclined")
+_KINDS = {  # kinds of tank in the terms of the rules: without, and with a floating roof
+    "vertical": (("vertical_fixed_roof",), ("vertical_floating_roof",)),
+    "horizontal": (_LYING, _LYING),
+    "sphere": (("sphere",), ("sphere",)),
+    "mesh": (("other",), ("other",)),
 }
 
 
@@ -49,7 +50,7 @@ def read_next_verification(raw, values, log):
         return None, None
     named = find_rule(raw, name, log, _KEY)
     day = values["survey"]["date"]
-    if named is None or day is None:
+    if named is None or day is None or values["tank"]["kind"] is None:
         return None, None
     rule, file = named
     period = _shortest_period(rule, values)
@@ -73,9 +74,8 @@ def read_next_verification(raw, values, log):
 
 def _shortest_period(rule, values):
     """Return the shortest Period of the whole tank, or None."""
-    kinds = _KINDS.get(values["tank"]["kind"], ())
-    if values["tank"]["kind"] == "vertical":
-        kinds = kinds[1:] if values["roof"]["mass_kg"] is not None else kinds[:1]
+    has_roof = values["roof"]["mass_kg"] is not None
+    kinds = _KINDS[values["tank"]["kind"]][has_roof]
     periods = [
         period
         for period in rule.periods

@@ -5,6 +5,7 @@ from tankcal.job.contract.kinds import VERTICAL
 from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.plausibility import ROOF_KG_M2
 from tankcal.messages import message
+from tankcal.methods.base import methods
 
 KEYS = (
     positive(
@@ -118,7 +119,8 @@ def _check_zones(roof, raw, log):
             low=usual,
         )
         tell(log.problem, raw, "roof", ZONES[1][0], expected)
-    if high_legs is not None and "liquid" in raw.tables:
+    supplements = {table for method in methods() if method.is_supplement for table in method.tables}
+    if high_legs is not None and supplements & set(raw.tables):
         expected = message(
             "high_legs_with_liquid",
             "given beside metered liquid; expected a single position of the legs",

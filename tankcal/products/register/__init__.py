@@ -1,10 +1,13 @@
-"""Register of the certificates of a laboratory: issued, replaced, withdrawn."""
+"""Certificates of laboratories: their register, and a page for digital certificates."""
 
 from tankcal.products.base import Product
 
 
 class Register(Product):
-    """Register of certificates; `tankcal history` shows their states."""
+    """Register of certificates, and pages that show digital certificates."""
 
     name = "register"
-    commands = (("register", "tankcal.products.register.command"),)
+    commands = (
+        ("register", "tankcal.products.register.command"),
+        ("dcc", "tankcal.products.register.dcc_command"),
+    )
