@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.report import blocks
-from tankcal.report.dcc.elements import CERTIFICATE, DCC, clean
+from tankcal.report.dcc.elements import CERTIFICATE, DCC, ONE, clean
 from tankcal.text.digits import NOTHING
 
 MOST_BYTES = 50_000_000
@@ -29,7 +29,7 @@ _SYMBOLS = {  # of units of D-SI; the name of any other unit is shown
     "degreecelsius": "°C",
     "degree": "°",
     "percent": "%",
-    "one": "",
+    ONE[1:]: "",
     "pascal": "Pa",
     "bar": "bar",
     "radian": "rad",
@@ -81,14 +81,14 @@ def _refusal(path, text):
     return InputError(Problem(path.name, text))
 
 
-def certificate_blocks(root, paper, language, digest):
+def certificate_blocks(root, words_of, language, digest):
     """Return the blocks of the page.
 
     Parameters
     ----------
     root : Element
         Of `read_certificate`.
-    paper : PlainPaper
+    words_of : PlainPaper
         Words of the headings.
     language : str
         Language of the headings, and of the contents as far as the certificate has it.
@@ -99,7 +99,7 @@ def certificate_blocks(root, paper, language, digest):
     -------
     list of Block
     """
-    view = _View(root, paper, language.split("-")[0])
+    view = _View(root, words_of, language.split("-")[0])
     core = view.find(root, "administrativeData", "coreData")
     number = view.plain(core, "uniqueIdentifier")
     shown = [
@@ -110,15 +110,15 @@ def certificate_blocks(root, paper, language, digest):
             date=view.plain(core, "issueDate") or view.plain(core, "endPerformanceDate"),
         ),
         blocks.masthead(
-            paper.word("dcc_view.title"),
-            paper.word("dcc_view.schema", version=clean(root.get("schemaVersion"))),
-            number_label=paper.word("page.number"),
+            words_of.word("dcc_view.title"),
+            words_of.word("dcc_view.schema", version=clean(root.get("schemaVersion"))),
+            number_label=words_of.word("page.number"),
             number=number,
         ),
-        blocks.paragraph(paper.word("dcc_view.note", digest=digest)),
+        blocks.paragraph(words_of.word("dcc_view.note", digest=digest)),
     ]
     if any(_name(element) == "Signature" for element in root):
-        shown.append(blocks.paragraph(paper.word("dcc_view.signature")))
+        shown.append(blocks.paragraph(words_of.word("dcc_view.signature")))
     shown += view.administrative(view.find(root, "administrativeData"))
     for result in view.all(view.find(root, "measurementResults"), "measurementResult"):
         shown += view.measurement(result)
@@ -212,7 +212,7 @@ class _View:
         return blocks.key_values([(label, text) for label, text in facts if text])
 
     def _contact(self, element, name):
-        """Name and address of a contact in one line."""
+        """Name and address of a contact, separated by commas."""
         contact = self.find(element, name)
         place = self.find(contact, "location")
         parts = [self.text(contact, "name")]
