@@ -17,6 +17,7 @@ from tankcal.job.tables import Log, fingerprint, nearest, read_beside, read_byte
 from tankcal.messages import message
 from tankcal.tank.rules.model import (
     DEVIATION_OF,
+    FROM_LEVEL,
     GUARDS,
     PERIOD_OF,
     PLATE,
@@ -38,9 +39,17 @@ HEAD = (
     Field("source", "text", "where its values were read", required=True),
     Field("verified", "flag", "whether they were read in the legal or technical text itself"),
     Field("remark", "text", "anything that is to stand beside it"),
+    Field("country", "text", "country of the rule, two letters of ISO 3166-1; blank: several"),
+    Field("title", "text", "title of the text"),
+    Field("number", "text", "number of the text"),
+    Field("date", "date", "date of the text, year-month-day"),
 )
 SOURCE = (
-    Field("clause", "text", "where it stands in the text"),
+    Field("clause", "text", "where it stands in the text; blank: article and quotation"),
+    Field("article", "text", "article or clause of the text"),
+    Field("quotation", "text", "its words, at most 25"),
+    Field("read_by", "text", "person or project that read it"),
+    Field("read_on", "date", "day on which it was read, year-month-day"),
     Field("verified", "flag", "whether it was read in the legal or technical text itself"),
 )
 # Keys of the file of a decision rule: [rule], and [PART.NAME] for the parts of LIMITS.
@@ -52,12 +61,14 @@ RULE = (
 )
 _SHARED = (Field("tanks", "names", "kinds of tank that it is for"), *SOURCE)
 _PERCENT = positive("limit_percent", "limit in percent", 100)
+MOST_QUOTED = 25  # words of a quotation
 LIMITS = {
     "uncertainty": (
         choice("of", "what is limited", UNCERTAINTY_OF, required=True),
         _PERCENT,
         choice("relative_to", "what the limit is a part of", RELATIVE_TO),
         positive("minimum_height_m", "least height of a delivery", 100),
+        choice("from_level", "level from which the limit is valid; blank: everywhere", FROM_LEVEL),
         *_SHARED,
     ),
     "deviation": (
@@ -66,6 +77,7 @@ LIMITS = {
         positive("limit_m3", "limit as a volume", 1e9),
         choice("side", "which deviations are limited", SIDES),
         choice("guard", "width of the guard band", GUARDS, required=True),
+        positive("in_service_factor", "factor of the limit for a table in use", 10),
         *_SHARED,
     ),
     "reference_height": (
@@ -131,6 +143,7 @@ class RuleFiles:
                 log.problem(file, self._expect_sections(part), row, f"[{section}]")
             elif name:
                 values = read_section(file, section, self.sections[part], keys, row, log)
+                _tell_quotation(file, section, values, keys, log)
                 if self.check:
                     self.check(file, part, section, values, keys, row, log)
                 limits.append((part, name, values))
@@ -155,7 +168,8 @@ class RuleFiles:
         for _, _, values in limits:
             if values["verified"] is None:
                 values["verified"] = bool(head["verified"])
-            values["clause"] = values["clause"] or ""
+            cited = filter(None, (values["article"], values["quotation"]))
+            values["clause"] = values["clause"] or ": ".join(cited)
         head["remark"] = head["remark"] or ""
         return self.make(head, limits, file)
 
@@ -207,6 +221,19 @@ class RuleFiles:
         missing = message("no_rule_file_there", "no such file: {file}", file=name)
         _tell_unknown("--rule", None, None, name, missing, self.names(), log)
         return None
+
+
+def _tell_quotation(file, section, values, keys, log):
+    """Report a quotation that is too long."""
+    count = len((values["quotation"] or "").split())
+    if count > MOST_QUOTED:
+        expected = message(
+            "long_quotation",
+            "{count} words; expected at most {most}",
+            count=count,
+            most=MOST_QUOTED,
+        )
+        log.problem(file, expected, keys["quotation"].row, f"{section}.quotation")
 
 
 def limits_one_table(rule):
@@ -369,6 +396,7 @@ def _make_rule(head, limits, file):
                 limit=_part(values["limit_percent"]),
                 relative_to=values["relative_to"] or "itself",
                 minimum_height_m=values["minimum_height_m"],
+                from_level=values["from_level"],
                 **shared,
             )
             for values, shared in by_part["uncertainty"]
@@ -380,6 +408,7 @@ def _make_rule(head, limits, file):
                 limit_m3=values["limit_m3"],
                 side=values["side"] or "both",
                 guard=values["guard"],
+                in_service_factor=values["in_service_factor"] or 1.0,
                 **shared,
             )
             for values, shared in by_part["deviation"]

@@ -86,7 +86,7 @@ def judge_limits(rule, tank, former, new, basis, new_U):
         Uncertainty of the new table at the rows.
     """
     numbers = [
-        _deviation(limit, basis, new_U)
+        _deviation(limit.in_service(), basis, new_U)  # the former table is in use
         for limit in rule.deviation
         if limit.applies_to(tank) and basis.usable.any()
     ]

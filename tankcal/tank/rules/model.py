@@ -3,7 +3,7 @@
 `PrintedU` holds printed expanded uncertainties, where they differ from those of the table.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ DEVIATION_OF = ("volumes", "capacity", "deliveries")
 RELATIVE_TO = ("itself", "capacity")
 SIDES = ("both", "upper", "lower")
 GUARDS = ("none", "U")
+FROM_LEVEL = ("lower_accurate",)
 PERIOD_OF = ("all", "bottom_course")
 PLATE = (  # entries of the identification plate of a tank
     *("laboratory", "tank_id", "certificate_number", "certificate_number_and_year"),
@@ -56,6 +57,9 @@ class UncertaintyLimit(TankLimit):
         "itself": the row, the capacity, the delivered volume; "capacity".
     minimum_height_m : float or None
         Least height of a delivery; None for other limits.
+    from_level : str or None
+        "lower_accurate": the limit is valid from the lower limit of accurate capacity, the level
+        from which all rows meet it and which the certificate states; None: everywhere.
     name, tanks, clause, verified
         As for a TankLimit.
     """
@@ -64,6 +68,7 @@ class UncertaintyLimit(TankLimit):
     limit: float | None
     relative_to: str
     minimum_height_m: float | None
+    from_level: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,6 +87,8 @@ class DeviationLimit(TankLimit):
         "both"; "upper": only larger volumes are limited; "lower": only smaller volumes.
     guard : str
         "none": accepted up to the limit; "U": up to the limit less U (JCGM 106:2012 8.3.2).
+    in_service_factor : float
+        Factor of the limit for a table in use, such as 2 for twice the limit of verification.
     name, tanks, clause, verified
         As for a TankLimit.
     """
@@ -91,6 +98,13 @@ class DeviationLimit(TankLimit):
     limit_m3: float | None
     side: str
     guard: str
+    in_service_factor: float = 1.0
+
+    def in_service(self):
+        """Return the limit for a table in use."""
+        factor, limits = self.in_service_factor, (self.limit, self.limit_m3)
+        limit, limit_m3 = (None if value is None else factor * value for value in limits)
+        return replace(self, limit=limit, limit_m3=limit_m3, in_service_factor=1.0)
 
 
 @dataclass(frozen=True, kw_only=True)

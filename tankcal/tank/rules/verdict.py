@@ -192,10 +192,11 @@ class UncertaintyVerdict:
     ----------
     limit : UncertaintyLimit
     code : str
-        "holds": everywhere; "holds_from": only from `from_m` on; "fails": nowhere; "stated": no
-        limit is given; "nothing_to_judge": no row or delivery is for use.
+        "holds": everywhere; "holds_from": only from `from_m` on; "holds_accurate": from there on,
+        and the limit is valid only from this level; "fails": nowhere; "stated": no limit is given;
+        "nothing_to_judge": no row or delivery is for use.
     passed : bool or None
-        True for "holds", False for "holds_from" and "fails", else None.
+        True for "holds" and "holds_accurate", False for "holds_from" and "fails", else None.
     from_m : float or None
         Least dip from which on all rows meet the limit, or least height of such deliveries; None:
         none, or no limit is given.
@@ -293,12 +294,13 @@ def _judge_rows(limit, table, printed, rows, capacity):
     exceeded = np.flatnonzero(~is_met)
     # The limit is met from the row after the last row that exceeds it.
     first = exceeded[-1] + 1 if len(exceeded) else 0
-    code = "holds" if not len(exceeded) else "holds_from" if first < len(rows) else "fails"
+    partly = "holds_accurate" if limit.from_level == "lower_accurate" else "holds_from"
+    code = "holds" if not len(exceeded) else partly if first < len(rows) else "fails"
     worst = int(np.argmax(ratio))
     return UncertaintyVerdict(
         limit,
         code,
-        code == "holds",
+        code in ("holds", "holds_accurate"),
         from_m=None if code == "fails" else float(table.height_m[rows[first]]),
         from_m3=None if code == "fails" else float(volume[first]),
         worst_m=float(table.height_m[rows[worst]]),
