@@ -40,6 +40,8 @@ REQUIREMENTS = (
     Requirement("conditions", ISO_17025, "7.8.4", SUMMARY, entries.check_conditions),
     Requirement("traceability", ISO_17025, "7.8.4", SUMMARY, entries.check_traceability),
     Requirement("equipment", ISO_17025, "6.4", MEMORY, entries.check_calibration_dates),
+    Requirement("references", "OIML R 71", "", MEMORY, entries.check_references),
+    Requirement("size", "ISO 7507", "", MEMORY, results.check_size),
     Requirement("overrulings", ISO_17025, "7.8.2", MEMORY, entries.check_overrulings),
     Requirement("notice", ISO_17025, "7.8.1", MEMORY, entries.check_notice),
     Requirement("print", ISO_17025, "7.8.1", MEMORY, agreement.check_print, _PRINTED),

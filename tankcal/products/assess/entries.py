@@ -4,7 +4,13 @@ from datetime import date
 
 from tankcal.messages import message
 from tankcal.products.assess.evidence import CERTIFICATE, compact
-from tankcal.products.assess.requirements import MINOR, OBSERVATION, Finding
+from tankcal.products.assess.requirements import (
+    ISO_17025,
+    MEMORY,
+    MINOR,
+    OBSERVATION,
+    Finding,
+)
 from tankcal.products.assess.wording import (
     PLACEHOLDER,
     claim_text,
@@ -151,6 +157,24 @@ def check_traceability(evidence):
         if not str(certificate or "").strip():
             text = message("assess_no_trace", "{name}: no calibration certificate", name=name)
             yield Finding(text, file=RECORD, section=section)
+
+
+def check_references(evidence):
+    """Yield dips without a reference height, and calibrations known by their number only."""
+    job = evidence.record["job"]
+    if job["datum"]["reference_height_m"] is None:
+        text = message(
+            "assess_no_reference_height",
+            "no reference height: nobody can check by a dip whether the tank has moved",
+        )
+        yield Finding(text, OBSERVATION, RECORD, section="datum.reference_height_m")
+    if not job.get("equipment"):
+        text = message(
+            "assess_no_register",
+            "the calibrations of the instruments have no laboratory and no date",
+        )
+        clause = (ISO_17025, "7.8.4", MEMORY)
+        yield Finding(text, OBSERVATION, RECORD, section="equipment", clause=clause)
 
 
 def check_calibration_dates(evidence):

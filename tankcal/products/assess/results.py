@@ -23,6 +23,8 @@ _SAME_M = 1e-9  # largest difference of equal dips
 LEAST_PROBABILITY, MOST_PROBABILITY = 0.94, 0.96  # "approximately 95 %" of ILAC-P14
 LARGE_SHARE = 0.5  # share of the variance above which a default u is reported
 MOST_REJECTED = 0.05  # share of rejected readings above which an assessor asks
+# Typical U of a table by the annexes of ISO 7507, from memory; half of it makes an assessor ask.
+USUAL_PERCENT, SMALL_PERCENT = 0.1, 0.05
 MOST_ROWS_NAMED = 5  # rows named for a fault, at most
 
 
@@ -241,6 +243,19 @@ def check_capability(evidence):
             percent=percent, cmc=capability["percent"],
         )  # fmt: skip
         yield Finding(text, file=RECORD, section="capacity.U_m3")
+
+
+def check_size(evidence):
+    """Yield a relative U of the capacity that is smaller than surveys usually attain."""
+    capacity = evidence.record["capacity"]
+    percent = 100 * stated_U_m3(capacity)[-1] / capacity["volume_m3"][-1]
+    if 0 < percent < SMALL_PERCENT:
+        text = message(
+            "assess_small_u",
+            "U of the capacity is {percent:.2g} %, less than the usual {usual:g} % or more",
+            percent=percent, usual=USUAL_PERCENT,
+        )  # fmt: skip
+        yield Finding(text, OBSERVATION, RECORD, section="capacity.U_m3")
 
 
 def check_input(evidence):
