@@ -201,8 +201,13 @@ def test_command_writes_and_reports(station, tmp_path, capsys):
     }
     for language in ("es", "pt-BR"):
         assert cli.main(["report", str(out), "--language", language, "--quiet"]) == 0
-    assert cli.main(["verify", str(out), "--quiet"]) == 0
-    capsys.readouterr()
+    verify = ["verify", str(out), "--job", str(station), "--quiet"]
+    assert cli.main(verify) == 0
+    assert "all equal" in capsys.readouterr().out
+    saved["deliveries"][0]["U_m3"] *= 1.001
+    (out / "upkeep.json").write_text(json.dumps(saved))
+    assert cli.main(verify) == 2
+    assert "U_m3" in capsys.readouterr().out
 
 
 @pytest.mark.slow

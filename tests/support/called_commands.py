@@ -457,6 +457,41 @@ rule = "guarded"
 READINGS = b"level,dip_m,gauge_m\nlow,1.812,1.814\nmid,4.904,4.907\nhigh,7.731,7.735\n"
 
 
+UPKEEP = b"""
+[upkeep]
+record = "record.json"
+timezone = "UTC"
+service = "terminal"
+
+[liquid]
+expansion_per_k = 0.0008
+base_c = 15
+
+[gauge]
+resolution_mm = 1
+
+[levels]
+files = ["levels.csv"]
+
+[meters]
+files = ["sales.csv"]
+"""
+
+
+def _write_days():
+    """Logs of four days of a terminal: an hour of flow each morning from a falling level."""
+    levels, sales = ["time,level_mm,temperature_c"], ["time,meter,total_l"]
+    for hour in range(96):
+        day, clock = divmod(hour, 24)
+        stamp, sold = f"2026-03-{day + 1:02d}T{clock:02d}", day + (clock > 8)
+        sales.append(f"{stamp}:00:00,A,{100_000 * sold}")
+        for minute in range(0, 60, 20):
+            levels.append(f"{stamp}:{minute:02d}:00,{6000 - 500 * sold + minute % 3},15.5")
+    texts = {"levels.csv": levels, "sales.csv": sales,
+             "meters.csv": ["meter,u_factor_ppm,certificate", "A,300,C-1"]}  # fmt: skip
+    return {name: "\n".join([*rows, ""]).encode() for name, rows in texts.items()}
+
+
 def _make_quantities(folder):
     """Commands from the table of a record to the quantity."""
     write_tree(folder, read_example("strapping"))
@@ -464,6 +499,7 @@ def _make_quantities(folder):
     record = {"record.json": (folder / "results" / "record.json").read_bytes()}
     ticket = record | {"ticket.toml": TICKET}
     gauge = record | {"gauge.toml": GAUGE, "readings.csv": READINGS}
+    upkeep = record | {"upkeep.toml": UPKEEP, **_write_days()}
     command = ("ticket", "{in}/record.json", "{in}/ticket.toml")
     bases = {
         "ticket": Base((*command, "--json"), ticket, ("ticket.toml",), complains=False),
@@ -480,6 +516,8 @@ def _make_quantities(folder):
                       complains=False),
         "gauge certificate": Base(("gauge", "{in}", "--quiet", "--out", "{out}"), gauge,
                                   ("gauge.toml", "readings.csv"), complains=False),
+        "upkeep": Base(("upkeep", "{in}", "--json"), upkeep,
+                       ("upkeep.toml", "levels.csv", "meters.csv", "sales.csv"), complains=False),
         "chart": Base(("chart", "{in}/record.json", "--step-cm", "5", "--json", "--out",
                        "{out}/chart.pdf"), record, complains=False),
     }  # fmt: skip

@@ -97,6 +97,8 @@ class LevelSums:
             run, last = None, NOT_A_TIME
             for chunk in file.chunks():
                 chunk = _separate_tags(chunk, file.profile)
+                if not len(chunk["time"]):
+                    continue
                 time, level = chunk["time"], chunk["level"]
                 late = time < np.maximum.accumulate(np.append(last, time))[:-1]
                 file.findings.add("levels", "late", time[late])

@@ -5,6 +5,7 @@ columns of the profile are read. Rows that cannot be used are counted by kind, w
 the last time; no value is corrected.
 """
 
+import csv
 import re
 import struct
 from collections import defaultdict
@@ -13,6 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
+from tankcal.job.folder import is_row, separator_of_text
 from tankcal.job.tables import Log, unreadable_file
 from tankcal.messages import message
 from tankcal.products.upkeep.clocks import NOT_A_TIME, LocalClock
@@ -21,6 +23,8 @@ from tankcal.products.upkeep.profiles import KINDS, QUANTITIES, LogProfile
 CHUNK = 200_000  # rows
 MOST_BAD_ROWS = 3  # rows named in messages of a file
 MOST_CAPTURE_BYTES = 200_000_000
+HEAD_BYTES = 65_536  # by which the layout of a file is found
+COMMA_NUMBER = re.compile(r"(?:^|[;\t|\"])\s*-?\d+,\d+\s*(?:$|[;\t|\"])")
 TIMES = ("time", "begin", "end")
 TEXTS = ("tank", "meter", "ticket", "kind", "quality", "tag")
 HAS_OFFSET = re.compile(r"(?:Z|[+-]\d\d:?\d\d)$")
@@ -57,6 +61,28 @@ class Findings:
     def number(self, log, kind):
         """Number of rows of a kind."""
         return self.counts[log, kind][0] if (log, kind) in self.counts else 0
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Layout of a CSV file.
+
+    Attributes
+    ----------
+    encoding, separator, decimal : str
+    rows_above : int
+        Rows above the first row of data.
+    headings : list of str
+    has_comments : bool
+        Whether lines that begin with # are comments.
+    """
+
+    encoding: str
+    separator: str
+    decimal: str
+    rows_above: int
+    headings: list
+    has_comments: bool
 
 
 @dataclass
@@ -98,41 +124,68 @@ class LogFile:
     def _csv(self):
         """Yield chunks of texts of a CSV file: a data frame with the columns of the profile."""
         options, columns = self.profile.file, self.profile.columns
-        names = list(options["headings"]) if options.get("headings") else None
-        skipped = int(options.get("skip_rows") or 0)
-        arguments = {
-            "sep": options.get("separator", ","), "encoding": options.get("encoding", "utf-8-sig"),
-            "skiprows": skipped, "na_values": list(options.get("missing", ())),
-            "decimal": options.get("decimal", "."), "skipinitialspace": True,
-        }  # fmt: skip
-        with open(self.path, encoding=arguments["encoding"], errors="replace") as stream:
-            first = [stream.readline() for _ in range(skipped + 1)][-1]
-        present = names or [name.strip() for name in first.strip().split(arguments["sep"])]
-        used = {heading: column for column, heading in columns.items() if heading in present}
+        layout = self._find_layout()
+        present = list(options["headings"]) if options.get("headings") else layout.headings
+        used = {present.index(heading): column
+                for column, heading in columns.items() if heading in present}  # fmt: skip
         for group in KINDS[self.kind]:
             if not any(column in used.values() for column in group):
                 headings = [columns[column] for column in group if column in columns]
                 text = message("upkeep_no_column", "no column {headings}; the file has {present}",
                                headings=", ".join(headings),
                                present=", ".join(present)[:200])  # fmt: skip
-                self.log.problem(self.path.name, text, 1)
+                self.log.problem(self.path.name, text, layout.rows_above or 1)
                 return
-        texts = [heading for heading, column in used.items() if column in (*TIMES, *TEXTS)]
+        texts = [place for place, column in used.items() if column in (*TIMES, *TEXTS)]
         frames = pd.read_csv(
-            self.path, names=names, header=None if names else 0, usecols=list(used),
-            dtype=dict.fromkeys(texts, str), chunksize=CHUNK, on_bad_lines="error", **arguments,
+            self.path, names=range(len(present)), header=None, index_col=False,
+            usecols=sorted(used), dtype=dict.fromkeys(texts, str), chunksize=CHUNK,
+            sep=layout.separator, decimal=layout.decimal, encoding=layout.encoding,
+            skiprows=layout.rows_above, comment="#" if layout.has_comments else None,
+            na_values=list(options.get("missing", ())), skipinitialspace=True,
         )  # fmt: skip
-        row = skipped + (1 if names else 2)
-        for frame in frames:
-            frame = frame.rename(columns=lambda heading: used[heading.strip()])
-            if names is None and len(frame) and frame["time"].iloc[0] == columns["time"]:
-                frame = frame.iloc[1:]  # the heading again, such as in joined files
-            yield row, self._numbers(frame)
-            row += len(frame)
+        row = layout.rows_above + 1
+        for chunk in frames:
+            frame = chunk.rename(columns=used)
+            # The heading again, such as in joined files, is no row.
+            frame = frame[frame["time"].str.strip() != columns["time"]]
+            yield row, self._numbers(frame, layout.decimal)
+            row += len(chunk)
 
-    def _numbers(self, frame):
+    def _find_layout(self):
+        """`Layout` of the file: as declared in the profile, or by its first rows."""
+        options = self.profile.file
+        with open(self.path, "rb") as stream:
+            data = stream.read(HEAD_BYTES)
+        encoding = options.get("encoding")
+        if encoding is None:
+            # In UTF-16 every second byte of a latin text is 0.
+            marks = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
+            by_zeros = {data[1:2]: "utf-16-le", data[:1]: "utf-16-be"}
+            encoding = marks.get(data[:2]) or by_zeros.get(b"\0", "utf-8-sig")
+            try:
+                data[: len(data) // 2 * 2].decode(encoding)
+            except UnicodeDecodeError as error:
+                if error.start < len(data) - 4:
+                    encoding = "cp1252"
+        lines = data.decode(encoding, errors="replace").splitlines()
+        first = int(options.get("skip_rows") or 0)
+        while first < len(lines) and not is_row(lines[first]):
+            first += 1
+        rows = [line for line in lines[first:] if is_row(line)]
+        separator = options.get("separator") or separator_of_text("\n".join(rows[:50]), ",")
+        decimal = options.get("decimal")
+        if decimal is None:
+            has_comma = any(COMMA_NUMBER.search(line) for line in rows[1:50])
+            decimal = "," if separator != "," and has_comma else "."
+        cells = next(csv.reader(rows[:1], delimiter=separator), [])
+        return Layout(
+            encoding, separator, decimal, first + (0 if options.get("headings") else 1),
+            [cell.strip() for cell in cells], any(line.startswith("#") for line in lines[first:]),
+        )  # fmt: skip
+
+    def _numbers(self, frame, decimal):
         """{column: values} with numbers in SI; words in place of numbers are nan, and counted."""
-        decimal = self.profile.file.get("decimal", ".")
         result = {}
         for column in frame:
             values = frame[column]

@@ -333,4 +333,5 @@ DOCUMENT = SavedDocument(
     ),
     tables=FILES,
     has_page=False,
+    recomputed_by="tankcal.products.upkeep.recomputation:compute_again",
 )

@@ -182,7 +182,9 @@ def build_steps(pieces, flows, tickets, volume_m3, rules, findings, events=()):
     is_quiet = pieces.sd_m <= 3 * max(rules.noise_m, rules.quantum_m / np.sqrt(12))
     findings.add("levels", "not_quiet", pieces.time_ns[~is_quiet], pieces.count[~is_quiet].sum())
     pieces = pieces.select(is_quiet)
-    sold = np.array([flow.volume_m3(pieces.time_ns) for flow in flows]).reshape(-1, len(pieces))
+    sold = np.array([flow.volume_m3(pieces.time_ns) for flow in flows]).reshape(
+        len(flows), len(pieces)
+    )
     stock = volume_m3(pieces.level_m)
     # Book less gauge: a rise without enough sale is a delivery.
     gain = np.diff(stock) + np.diff(sold.sum(axis=0))
@@ -204,6 +206,8 @@ def _choose(pieces, is_free, rules):
     """Indices of the pieces that become marks: ends of full steps and of long rests."""
     least = max(FULL_STEP * rules.quantum_m, FULL_SHARE * rules.height_m)
     free = np.flatnonzero(is_free)
+    if not len(free):
+        return free
     levels, times, windows = pieces.level_m[free], pieces.time_ns[free], pieces.window[free]
     # A long rest has marks at its first and last piece and between them, so that a leak shows.
     is_first = np.append(True, windows[1:] != windows[:-1])
