@@ -93,12 +93,12 @@ $(VENV)/base: pyproject.toml constraints.txt
 	$(BIN)/pip install --editable .
 	touch $@
 
-$(VENV)/beginner: $(VENV)/base # tankcal notebook and tankcal app, which the first pages name
-	$(BIN)/pip install --editable '.[lab,app]'
+$(VENV)/beginner: $(VENV)/base # tankcal notebook, which the first pages name
+	$(BIN)/pip install --editable '.[lab]'
 	touch $@
 
 $(VENV)/full: $(VENV)/beginner
-	$(BIN)/pip install --quiet --editable '.[test,check,images,clouds,cluster,lab,app]'
+	$(BIN)/pip install --quiet --editable '.[test,check,images,clouds,cluster,lab]'
 	$(BIN)/python -m tankcal.cli.kernels
 	touch $@
 

@@ -37,7 +37,7 @@ a new tank, step by step:
   (enter the measurements in the CSV files or in the workbook)
   tankcal run my-tank           compute the job; the results are in my-tank/results
   tankcal notebook my-tank      edit, check and compute the job in a notebook (JupyterLab)
-  tankcal app my-tank           the same in a web page without code
+  tankcal app                   the same in a browser, from the first tank to the certificate
   tankcal report my-tank/results --language es   write the reports again, in Spanish
   tankcal lint table.csv        check any capacity table for errors
   tankcal read-table old.csv --courses courses.csv   radii and head from a former table
@@ -66,6 +66,8 @@ def main(arguments=None):
     _open_closed_streams()
     _print_in_any_encoding()
     speak()
+    if arguments is None and len(sys.argv) == 1 and _has_display():
+        arguments = ["app"]  # as started by a double click
     with _translate_argparse(words_of_run()):
         options = _options(arguments)
         options.arguments = sys.argv[1:] if arguments is None else list(arguments)
@@ -87,6 +89,13 @@ def main(arguments=None):
         return 0
     except BaseException as error:
         return _find_status(error)
+
+
+def _has_display():
+    """Return whether this session can open a browser."""
+    if sys.platform in ("win32", "darwin"):
+        return not os.environ.get("SSH_CONNECTION")
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def _find_status(error):

@@ -16,6 +16,7 @@ GROUP = "tankcal.products"  # entry points of products in other distributions
 _BUILT_IN = (  # in the order of `tankcal --help`
     "tankcal.products.shipped:MainJob",
     "tankcal.products.batch:Batch",
+    "tankcal.products.app:App",
     "tankcal.products.workbench:Workbench",
     "tankcal.products.fieldbooks:FieldBooks",
     "tankcal.products.shipped:Planning",

@@ -96,9 +96,7 @@ def test_no_example_of_a_form_is_english(language):
     assert not english & {known[one] for one in english}
 
 
-@pytest.mark.parametrize(
-    ("extra", "library"), [("app", "voila"), ("lab", "jupyterlab"), ("clouds", "pye57")]
-)
+@pytest.mark.parametrize(("extra", "library"), [("lab", "jupyterlab"), ("clouds", "pye57")])
 def test_a_remedy_names_libraries_that_the_index_has(extra, library):
     command = install_command(extra)
     assert " -m pip install " in command

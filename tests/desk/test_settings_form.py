@@ -115,7 +115,7 @@ def test_a_new_job_has_a_folder_of_its_own(tmp_path):
     first = create_job(tmp_path, "TQ/21", "vertical", None, "pt-BR")
     second = create_job(tmp_path, "TQ/21", "horizontal", "strapping", "es")
     assert [first.name, second.name] == ["TQ-21", "TQ-21-2"]
-    assert tomllib.loads((first / "job.toml").read_text())["tank"]["id"] == "TQ/21"
+    assert tomllib.loads((first / "job.toml").read_text())["tank"]["id"] == "TQ-21"
     with pytest.raises(InputError):
         create_job(tmp_path, "X", "mesh", "strapping", "en")
     assert not (tmp_path / "X").exists()

@@ -382,18 +382,6 @@ def test_desk_lists_its_tables(folder):
     assert not set(TABLES) & set(vars(Desk))
 
 
-def test_an_app_ends_what_a_closed_page_leaves_and_keeps_an_open_one(monkeypatch):
-    app = pytest.importorskip("voila.app")
-    from tankcal.products.workbench import serving
-
-    asked = []
-    monkeypatch.setattr(app.Voila, "launch_instance", lambda _, config: asked.append(config))
-    serving.serve_app("n.ipynb", 1, is_browser=False)
-    manager = asked[0]["MappingKernelManager"]
-    assert manager["cull_idle_timeout"] == 600
-    assert not manager["cull_connected"]
-
-
 @pytest.mark.slow
 def test_what_cannot_be_written_is_told_without_a_traceback(folder, monkeypatch):
     def refuse(*_args, **_options):

@@ -117,45 +117,6 @@ def test_what_is_not_installed_is_told_in_a_line(folder, capsys, monkeypatch):
     monkeypatch.setattr(serving, "find_spec", lambda name: None)
     assert main(["notebook", str(folder)]) == 0
     assert "jupyterlab>=" in capsys.readouterr().err
-    assert main(["app", str(folder)]) == 2
-    assert "voila>=" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("address", "is_open"),
-    [("127.0.0.1", False), ("localhost", False), ("::1", False), ("127.5.0.1", False),
-     ("0.0.0.0", True), ("192.168.0.7", True)],
-)  # fmt: skip
-def test_the_app_warns_of_an_open_address(folder, capsys, monkeypatch, address, is_open):
-    from tankcal.products.workbench import serving
-
-    served = []
-    monkeypatch.setattr(serving, "has_app", lambda: True)
-    monkeypatch.setattr(serving, "free_port", lambda address, port: 4711)
-    monkeypatch.setattr(serving, "serve_app", lambda *given: served.append(given))
-    assert main(["app", str(folder), "--address", address, "--no-browser"]) == 0
-    said = capsys.readouterr()
-    assert ("every machine that can connect to" in said.err) == is_open
-    ((_, port, where, is_browser, token),) = served
-    assert (port, where, is_browser) == (4711, address, False)
-    assert (len(token) > 20) == is_open
-    assert token in said.out
-
-
-@pytest.mark.parametrize(
-    "arguments", [["--port", "0"], ["--port", "70000"], ["--port", "x"], ["--address", "300.1.1.1"]]
-)
-def test_bad_addresses_are_told(folder, capsys, monkeypatch, arguments):
-    from tankcal.products.workbench import serving
-
-    monkeypatch.setattr(serving, "has_app", lambda: True)
-    monkeypatch.setattr(serving, "serve_app", lambda *given: pytest.fail("served"))
-    try:
-        status = main(["app", str(folder), *arguments])
-    except SystemExit as stop:
-        status = stop.code
-    assert status == 2
-    assert capsys.readouterr().err
 
 
 # ---- without hands: the same papers

@@ -13,9 +13,10 @@ import tankcal
 from tankcal.errors import InputError, Problem
 from tankcal.job.model import Overruling
 from tankcal.messages import message
+from tankcal.products.desk.result_pages import wall_page
 from tankcal.products.workbench.views import page as pages
 from tankcal.products.workbench.views import results_view
-from tankcal.products.workbench.views.page import Calculator, SavedView, parse_number, wall_page
+from tankcal.products.workbench.views.page import Calculator, SavedView, parse_number
 from tankcal.products.workbench.views.what_if import budget_sentences, change_budget, table_html
 from tankcal.record import record_of
 from tankcal.report.paper import Paper

@@ -118,6 +118,18 @@ class Desk:
             self._check = self.draft.check()
         return self._check
 
+    @property
+    def present_check(self):
+        """`Check` of the edited job if it was checked since the last edit, or None."""
+        return self._check
+
+    def keep_check(self, check, revision):
+        """Store a check made elsewhere, unless an edit has overtaken it; return whether stored."""
+        if revision != self.draft.revision:
+            return False
+        self._check = check
+        return True
+
     def listen(self, act):
         """Register a function act() that is called after each change."""
         self._listeners.append(act)

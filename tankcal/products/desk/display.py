@@ -104,9 +104,10 @@ class Reader:
         named = self.words["input"]["labels"].get(stem, field.name)
         return labels.get(f"{section}.{field.name}", named)
 
-    def help(self, name, owner, field):
-        """Description of a key with its accepted values."""
-        return self._unit_and_note(name, owner, field.name, field)[1]
+    def help(self, name, owner, field, with_expectation=True):
+        """Description of a key, with its accepted values unless the entry shows them."""
+        note = self._unit_and_note(name, owner, field.name, field)[1]
+        return note if with_expectation else note.partition(" · ")[0]
 
     def choice(self, field, code):
         """Text of a choice of a setting, in the words of the form."""
@@ -176,9 +177,8 @@ class Reader:
             ]
             for row in table.rows
         ]
-        places = {heading: place for place, heading in enumerate(table.headings)}
-        marks = self._marks(check, name, lambda place: (place[0], places.get(place[1])))
-        addable = tuple(heading for heading in fields if heading not in places)
+        marks = self.marks_in_grid(draft, check, name)
+        addable = tuple(heading for heading in fields if heading not in table.headings)
         return ShownTable(
             name,
             _plain_file(table.file),
@@ -190,6 +190,15 @@ class Reader:
             addable,
             True,
         )
+
+    def marks_in_grid(self, draft, check, name, every_key=False):
+        """Marks {(row, column): (level, text)} of a table or list, as in `ShownTable`."""
+        if name in draft.keys:
+            index = {place: row for row, place in enumerate(key_places(draft, name, every_key))}
+            value = KEY_COLUMNS.index(VALUE)
+            return self._marks(check, name, lambda place: self._place_of_key(index, place, value))
+        columns = {heading: place for place, heading in enumerate(draft.tables[name].headings)}
+        return self._marks(check, name, lambda place: (place[0], columns.get(place[1])))
 
     def _column(self, name, heading, field):
         """`ShownColumn` of a column of a table."""
@@ -220,9 +229,7 @@ class Reader:
             field = field_of(name, owner, key)
             shown = text_for_display(field, texts.get((owner, key), ""), ".", self.mark)
             rows.append([owner, key, shown, *self._unit_and_note(name, owner, key, field)])
-        index = {place: number for number, place in enumerate(places)}
-        value = 2
-        marks = self._marks(check, name, lambda place: self._place_of_key(index, place, value))
+        marks = self.marks_in_grid(draft, check, name, every_key)
         columns = (
             ShownColumn(OWNER, self.word("owner" if name == SETTINGS else "name"), "", "", False),
             ShownColumn(KEY, self.word("key"), "", "", False),

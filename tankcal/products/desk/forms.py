@@ -125,7 +125,7 @@ def form_of(desk):
                     _group_of(section, field, draft.kind, level),
                     reader.label(section, field),
                     split_unit(field.name)[1],
-                    reader.help(SETTINGS, section, field),
+                    reader.help(SETTINGS, section, field, not codes and field.kind != "date"),
                     _entry_of(field),
                     tuple((code, reader.choice(field, code)) for code in codes),
                     text_for_display(field, entries.get(place, ""), ".", reader.mark),

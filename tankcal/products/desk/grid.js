@@ -100,7 +100,7 @@ class Grid {
       });
       this.tools.append(choice);
     }
-    this.tools.append(this.button("undo", () => this.send("undo", {})));
+    if (this.words.undo) this.tools.append(this.button("undo", () => this.send("undo", {})));
   }
 
   // ---- what is shown
@@ -114,7 +114,8 @@ class Grid {
       scope: "col", title: one.note, "aria-colindex": place + 2, "data-column": one.name },
       element("span", { class: "tankcal-label" }, one.heading),
       element("span", { class: "tankcal-code" },
-        one.heading === one.name || !this.model.get("takes_rows") ? one.unit : one.name)));
+        one.heading === one.name || !this.model.get("takes_rows") || this.model.get("shows_units")
+          ? one.unit : one.name)));
     this.head.replaceChildren(element("th", { role: "columnheader", class: "tankcal-number",
       "aria-colindex": 1 }, "#"), ...heads);
     this.pane.setAttribute("aria-rowcount", this.rows.length + 1);
@@ -295,6 +296,25 @@ class Grid {
     this.tell();
   }
 
+  goTo(row, column) {
+    this.moveTo(row, column);
+    this.pane.focus();
+  }
+
+  // The next or the previous marked cell, from the chosen one on, cyclically.
+  goToMark(step) {
+    const width = this.columns.length;
+    const places = [...this.marks.keys()].map((place) => place.split(",").map(Number))
+      .filter(([row]) => !Number.isNaN(row))
+      .map(([row, column]) => row * width + (Number.isNaN(column) ? 0 : column));
+    places.sort((a, b) => a - b);
+    if (!places.length) return;
+    const now = this.active[0] * width + this.active[1];
+    const next = step > 0 ? places.find((place) => place > now) ?? places[0]
+      : places.findLast((place) => place < now) ?? places[places.length - 1];
+    this.goTo(Math.floor(next / width), next % width);
+  }
+
   // ---- typing in a cell
 
   beginTyping(text) {
@@ -346,6 +366,9 @@ class Grid {
     if (event.target !== this.pane) return;
     const [row, column] = this.active;
     const isFar = event.ctrlKey || event.metaKey;
+    // Keys of the page around the grid, such as Ctrl+S; in a notebook they stay in the grid.
+    const isOfPage = event.altKey || (isFar && ["s", "enter"].includes(event.key.toLowerCase()));
+    if (isOfPage && this.model.get("passes_keys")) return;
     const page = Math.max(1, Math.floor(this.pane.clientHeight / ROW_PX) - 2);
     const goals = {
       ArrowUp: [isFar ? 0 : row - 1, column],
@@ -359,8 +382,10 @@ class Grid {
     };
     if (goals[event.key]) this.moveTo(...goals[event.key], event.shiftKey);
     else if (event.key === "Enter" || event.key === "F2") this.beginTyping();
+    else if (event.key === "F8") this.goToMark(event.shiftKey ? -1 : 1);
     else if (event.key === "Delete" || event.key === "Backspace") this.clear();
-    else if (isFar && event.key.toLowerCase() === "z") this.send("undo", {});
+    else if (isFar && event.key.toLowerCase() === "z") this.send(event.shiftKey ? "redo" : "undo", {});
+    else if (isFar && event.key.toLowerCase() === "y") this.send("redo", {});
     else if (isFar && event.key.toLowerCase() === "a") {
       this.anchor = [0, 0];
       this.moveTo(this.rows.length - 1, this.columns.length - 1, true);
@@ -409,6 +434,8 @@ class Grid {
     this.model.on("change:rows", () => this.take());
     this.model.on("change:marks", () => this.takeMarks());
     this.model.on("msg:custom", (message) => {
+      if (message.kind === "go") this.goTo(message.row, message.column);
+      if (message.kind === "next") this.goToMark(message.step);
       if (message.kind !== "cells") return;
       for (const [row, column, text] of message.cells) {
         if (this.rows[row]) this.rows[row][column] = text;

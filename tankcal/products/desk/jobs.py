@@ -18,6 +18,9 @@ from tankcal.products.desk.states import JobState, State, state_of
 
 RECENT_FILE = "recent.json"
 MOST_RECENT = 200
+NOT_COPIED = (
+    *("results", "*-results", "published", ".*", "*.ipynb", "*.py", "*.md", "__pycache__"),
+)
 MOST_LETTERS = 60  # longest name of a new folder
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)  # names of Windows devices
 
@@ -47,7 +50,7 @@ def free_folder(workspace, tank):
 
 
 def create_job(workspace, tank, kind, survey, language):
-    """Create a job for a tank, and return its folder.
+    """Create a job for a tank, and return its folder; its name gets the permitted characters.
 
     Raises
     ------
@@ -60,9 +63,10 @@ def create_job(workspace, tank, kind, survey, language):
     write_starter(folder, kind, survey, language)
     from tankcal.products.desk.draft import Draft
 
-    if tank.strip():
+    name = re.sub(r"\.{2,}", ".", re.sub(r"[^\w .()-]+", "-", tank)).strip(" .-")
+    if name:
         draft = Draft(folder)
-        draft.set_value("job", "tank", "id", tank.strip())
+        draft.set_value("job", "tank", "id", name)
         draft.save()
     return folder
 
@@ -71,7 +75,7 @@ def copy_job(source, workspace, tank):
     """Copy the input files of a job to a new folder of the workspace, and return its path."""
     folder = free_folder(Path(workspace), tank)
     folder.parent.mkdir(parents=True, exist_ok=True)
-    ignored = shutil.ignore_patterns("results", "*-results", ".*", "*.ipynb", "__pycache__")
+    ignored = shutil.ignore_patterns(*NOT_COPIED)
     if source.is_file():
         folder.mkdir()
         shutil.copy2(source, folder / source.name)

@@ -4,10 +4,7 @@ from tankcal.products.base import Product
 
 
 class Workbench(Product):
-    """A job in a notebook or a web page."""
+    """A job in a notebook."""
 
     name = "workbench"
-    commands = (
-        ("notebook", "tankcal.products.workbench.command"),
-        ("app", "tankcal.products.workbench.command"),
-    )
+    commands = (("notebook", "tankcal.products.workbench.command"),)

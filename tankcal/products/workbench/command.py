@@ -1,6 +1,5 @@
-"""`tankcal notebook` and `tankcal app`: a job as a notebook, with and without code."""
+"""`tankcal notebook`: a job as a notebook."""
 
-import argparse
 from pathlib import Path
 
 from tankcal.errors import InputError, Problem
@@ -9,11 +8,9 @@ from tankcal.terminal.showing import complain, prepare_for_small_work, say, spea
 from tankcal.text.shipped import LANGUAGES
 from tankcal.version import install_command
 
-MOST_PORT = 65535
-
 
 def add(commands):
-    """Add the parsers of `tankcal notebook` and `tankcal app`."""
+    """Add the parser of `tankcal notebook`."""
     notebook = commands.add_parser(
         "notebook",
         help="edit, check and compute a job in a notebook",
@@ -32,23 +29,6 @@ def add(commands):
         "--no-open", action="store_true", help="write the notebook without opening it"
     )
     notebook.set_defaults(command=_notebook)
-    app = commands.add_parser(
-        "app",
-        help="serve a job as a web page without code",
-        description="Serve the notebook of a job as a web page without code (Voilà), for editing, "
-        "computing and saving in a browser of this machine. Ctrl-C stops the server.",
-    )
-    _add_job(app)
-    app.add_argument(
-        "--address",
-        metavar="ADDRESS",
-        default="127.0.0.1",
-        help="address of this machine to listen on (default: 127.0.0.1, not accessible from other "
-        "machines)",
-    )
-    app.add_argument("--port", metavar="N", type=_port, help="port (default: any free port)")
-    app.add_argument("--no-browser", action="store_true", help="do not open a browser")
-    app.set_defaults(command=_app)
 
 
 def _add_job(parser):
@@ -58,12 +38,6 @@ def _add_job(parser):
         choices=LANGUAGES,
         help="language of the notebook and its contents (default: language of the job)",
     )
-
-
-def _port(text):
-    if not (text.isascii() and text.isdigit() and 0 < int(text[:9]) <= MOST_PORT):
-        raise argparse.ArgumentTypeError(argparse._("invalid int value: %r") % text)
-    return int(text)
 
 
 def _write_notebook(options, out):
@@ -113,36 +87,3 @@ def _notebook(options):
         return
     prepare_for_small_work()
     serving.open_lab(path)
-
-
-def _app(options):
-    from tankcal.products.workbench import serving
-
-    if not serving.has_app():
-        expected = message(
-            "no_app",
-            "Voilà is not installed; to install it: {command}",
-            command=install_command("app"),
-        )
-        raise InputError(Problem("tankcal app", expected))
-    path = _write_notebook(options, None)
-    port = serving.free_port(options.address, options.port)
-    token = ""
-    if not serving.is_local(options.address):
-        token = serving.new_token()
-        complain(
-            message(
-                "app_is_open",
-                "warning: every machine that can connect to {address} and has the token of this "
-                "address can read, change and compute this job; the data are sent unencrypted",
-                address=options.address,
-            )
-        )
-    address = f"http://{options.address}:{port}/" + (f"?token={token}" if token else "")
-    say(
-        message(
-            "app_address", "open {address} in a browser; Ctrl-C stops the server", address=address
-        )
-    )
-    prepare_for_small_work()
-    serving.serve_app(path, port, options.address, not options.no_browser, token)

@@ -24,12 +24,12 @@ from tankcal.report.folders import default_folder
 from tankcal.text.shipped import DEFAULT, nearest_language
 
 # Environment variables of interactive sessions.
-SESSION_VARIABLES = ("JPY_SESSION_NAME", "VOILA_REQUEST_URL", "VSCODE_PID")
+SESSION_VARIABLES = ("JPY_SESSION_NAME", "VSCODE_PID")
 WIDGETS = ("ipywidgets", "anywidget")  # packages required for grids and buttons
 
 
 def is_attended():
-    """Whether the session is interactive (JupyterLab, Voilà, VS Code)."""
+    """Whether the session is interactive (JupyterLab, VS Code)."""
     return any(os.environ.get(name) for name in SESSION_VARIABLES)
 
 

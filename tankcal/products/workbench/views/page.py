@@ -1,4 +1,4 @@
-"""Pages for frames in a notebook: parts of the page of the report, with its scripts only.
+"""Frames with pages of a result in a notebook, and the answers of the calculators.
 
 The frame is a sandbox: a page has no access to the notebook and loads nothing from the network. In
 a saved notebook, the calculators and pictures of the page still work.
@@ -16,15 +16,8 @@ from html import escape
 import numpy as np
 
 from tankcal.errors import HeightError
-from tankcal.report.blocks import document
+from tankcal.products.desk.result_pages import whole_page
 from tankcal.report.numbers import unit
-from tankcal.report.tables import overrulings
-from tankcal.report.tables import tank as tables
-from tankcal.report.uncertainty import budget, capacity
-from tankcal.report.web import page
-from tankcal.report.web.calculator_data import calculator
-from tankcal.report.web.tank_shape import tank_view
-from tankcal.report.web.wall_map import wall_map_view
 from tankcal.text.digits import decimals_of, decimals_of_height, fixed
 from tankcal.text.words import say
 
@@ -32,46 +25,6 @@ HEIGHT = "44rem"  # height of a frame
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)")
 SAME_M = 1e-9  # largest difference of dips that are treated as equal
 MOST_LETTERS = 40  # largest number of characters of the entered text in an answer
-
-
-def table_page(paper, with_calculator=True):
-    """Page of the capacity table, with a search for rows by dip or any number."""
-    blocks = [calculator(paper)] if with_calculator else []
-    return _page(paper, [*blocks, *capacity.capacity_blocks(paper)])
-
-
-def wall_page(paper):
-    """Page of the wall, unrolled and in three dimensions, or None if it would be empty."""
-    blocks = [wall_map_view(paper)] if paper.record["sections"] else []
-    shape_view = tank_view(paper)
-    if not blocks and shape_view.data["reason"]:
-        return None
-    return _page(paper, [*blocks, shape_view])
-
-
-def whole_page(paper):
-    """Page with all parts, for a notebook without widgets or a saved notebook."""
-    record, blocks = paper.record, [calculator(paper), *capacity.capacity_blocks(paper)]
-    if record["sections"]:
-        blocks.append(wall_map_view(paper))
-    blocks.append(tank_view(paper))
-    if record["rejected"]:
-        blocks += [paper.heading("rejected"), paper.show(tables.REJECTED)]
-    if record.get("overrulings"):
-        blocks += [paper.heading("overrulings"), paper.show(overrulings.OVERRULINGS)]
-    if record["budget"]:
-        blocks += [paper.heading("budget"), *budget.top(paper)]
-    return _page(paper, blocks)
-
-
-def _page(paper, blocks):
-    """HTML page of blocks."""
-    first = document(
-        title=f"{paper.word('views.results')}, {paper.subject()}",
-        language=paper.words["language"]["code"],
-        notice=str(paper.record["job"]["certificate"].get("notice", "")),
-    )
-    return page([block.data for block in (first, *blocks)], has_contents=False)
 
 
 def frame_html(html, title):

@@ -15,41 +15,17 @@ import traitlets
 
 from tankcal.errors import InputError, TankcalError
 from tankcal.job.contract.overrulings import DECISIONS
-from tankcal.job.starter.texts import split_unit
+from tankcal.products.desk.result_pages import table_page, wall_page
 from tankcal.products.desk.tables import NUMBER
-from tankcal.products.quantity.reading import GAUGING, GLASS, PRODUCT, SHELL, read_tickets
-from tankcal.products.quantity.saving import ticket_file
+from tankcal.products.desk.ticket_form import FORM, answer_html, ticket_entry
+from tankcal.products.quantity.reading import read_tickets
 from tankcal.products.quantity.table import table_of
 from tankcal.products.quantity.transfer import STATES
-from tankcal.products.workbench.views.page import Calculator, frame_html, table_page, wall_page
+from tankcal.products.workbench.views.page import Calculator, frame_html
 from tankcal.products.workbench.views.what_if import BudgetPanel
-from tankcal.record.schema import to_plain
-from tankcal.report.ticket import TicketPaper
-from tankcal.report.ticket import tables as of_ticket
-from tankcal.report.ticket.pages import label_text, notes, result_text
-from tankcal.report.web import block_html
 from tankcal.report.web.wall_map import list_inspected, reason_text
-from tankcal.tank.gauging import FIELDS_OF_U, UNCERTAINTIES, UNITS_OF_U
-from tankcal.tank.volume_correction.corrections import TABLE
-from tankcal.tank.volume_correction.petroleum import BASE_NAMES
-from tankcal.text.digits import shortest
 from tankcal.text.words import say
 
-# {section: {key of the ticket: its label in [quantity.labels] of the words}}
-_GAUGING = {"dip_m": "dip", "ullage_m": "ullage", "water_dip_m": "water",
-            "temperature_c": "liquid", "ambient_c": "ambient"}  # fmt: skip
-FORM = {
-    "product": {
-        "correction": "correction", "group": "group", "base": "base", "alpha_per_k": "alpha",
-        "density_kg_m3": "density", "density_is": "density_is",
-        "density_temperature_c": "sample", "hydrometer": "hydrometer", "sw_percent": "sw",
-    },
-    "shell": {"insulated": "insulated"},
-    **dict.fromkeys(STATES, _GAUGING),
-    "uncertainty": FIELDS_OF_U,
-}  # fmt: skip
-# Codes of the ticket with another code in [quantity.choices] of the words.
-_CHOICES = {"CNP-6-70": "cnp", "CNP-6-70-unrounded": "cnp_unrounded", "coefficient": "constant"}
 _WRONG, _WARNED, _BLANK = "#a01818", "#6b4e00", "#4a5560"  # colours of remarks
 STYLE = """<style>.tankcal-ticket th, .tankcal-ticket td { padding: 0 8px; line-height: 1.6;
   vertical-align: top; text-align: left } .tankcal-ticket .right, .tankcal-ticket .decimal {
@@ -105,30 +81,16 @@ class QuantityPanel:
     def _entry(self, section, key, label):
         """Widget of a key: a tick box, a list of choices, or a number."""
         look = {"style": {"description_width": "66%"}, "layout": {"width": "98%"}}
-        field = next((item for item in (*PRODUCT, *SHELL, *GAUGING) if item.name == key), None)
-        if field is not None and field.kind == "flag":
+        entry = ticket_entry(self.paper, section, key)
+        if entry.kind == "flag":
             return widgets.Checkbox(value=False, description=label, indent=False)
-        if field is not None and field.choices:
-            # Factors of an own table are in a file, which only `tankcal ticket` reads.
-            choices = [(self._choice(key, code), code) for code in field.choices if code != TABLE]
+        if entry.kind == "choice":
+            choices = [(text, code) for code, text in entry.choices]
             return widgets.Dropdown(options=[("", None), *choices], description=label, **look)
-        unit, assumed = split_unit(key)[1], None
-        if section == "uncertainty":
-            unit, assumed = UNITS_OF_U[key], UNCERTAINTIES[key]
-        elif key == "sw_percent":
-            unit = "%"
         return widgets.Text(
-            description=f"{label}, {unit}", continuous_update=False,
-            placeholder="" if assumed is None else shortest(assumed, self.paper.marks), **look,
+            description=f"{label}, {entry.unit}", continuous_update=False,
+            placeholder=entry.assumed, **look,
         )  # fmt: skip
-
-    def _choice(self, key, code):
-        """Text of a choice of a key."""
-        if key in ("base", "hydrometer"):
-            return BASE_NAMES[GLASS.get(code, code)]
-        named = _CHOICES.get(code, code) if key == "correction" else code
-        # Names of standards have no translation.
-        return self._words["choices"].get(named, named)
 
     # ---- entries
 
@@ -200,26 +162,6 @@ class QuantityPanel:
 
     def _remark(self, place, text, colour):
         self.remarks[place].value += _line(text, colour)
-
-
-def answer_html(tickets, language):
-    """HTML of the quantities, steps and budget of a ticket, as in its document."""
-    paper = TicketPaper(to_plain(ticket_file(tickets)), language)
-    steps = of_ticket.STEPS.only("step", "formula", "source", "opening", "closing")
-    if "opening" not in tickets.quantities:
-        steps = steps.only("step", "formula", "source", "closing")
-    state = paper.words["states"][paper.state]
-    shown = [
-        paper.show(of_ticket.RESULTS, of_ticket.result_rows(paper)),
-        paper.show(steps),
-        paper.show(of_ticket.BUDGET, of_ticket.budget_rows(paper), state=state),
-    ]
-    main = ": ".join((label_text(paper), result_text(paper)))
-    return (
-        f'<div role="status"><b>{escape(main)}</b></div>'
-        + "".join(block_html(block.data) for block in shown)
-        + "".join(f"<div><small>{escape(text)}</small></div>" for text in notes(paper))
-    )
 
 
 def _line(text, colour):

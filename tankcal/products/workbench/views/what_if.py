@@ -60,7 +60,7 @@ def change_budget(result, paper, high_m, low_m=None, factors=None):
     result : Result
         Result of the job.
     paper : Paper
-        Paper of its record, for the names of the lines.
+        Report of its record, for the names of the lines.
     high_m, low_m : float
         Dips, m; with low_m None, the volume below high_m.
     factors : dict, optional

@@ -1,0 +1,308 @@
+"""Jobs that the app has open, uploads, and places of folders; found by identifiers of the app.
+
+No path of a request is used: a request names a job, an upload or a folder by an identifier that
+the app assigned when it listed it.
+"""
+
+import asyncio
+import hashlib
+import secrets
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from tankcal.errors import InputError
+from tankcal.products.app.runs import WorkerRun
+from tankcal.products.desk.desk import Desk
+from tankcal.products.desk.display import Reader
+from tankcal.products.desk.draft import Draft, source_of
+from tankcal.products.desk.jobs import RecentJobs
+from tankcal.products.desk.journal import Journal, find_state_folder
+from tankcal.products.desk.windows import describe_state
+from tankcal.report.folders import default_folder
+from tankcal.text.words import load_words
+
+SAVE_S = 2.0  # time after the last edit at which the files are written
+QUICK_CHECK_S = 0.08  # a full check that takes less time is made before the answer to an edit
+MOST_UPLOAD = 200_000_000  # bytes
+KEPT_UPLOAD_S = 24 * 3600
+MOST_WAITING = 64  # events that wait for a window
+
+
+def identifier(path):
+    """Identifier of a path in addresses."""
+    return hashlib.sha256(str(path).encode("utf-8", "surrogateescape")).hexdigest()[:16]
+
+
+@dataclass(frozen=True)
+class Upload:
+    """An uploaded file: its path, named by the app, and the name given by the user."""
+
+    path: Path
+    name: str
+
+
+class OpenJob:
+    """A job with its desk, its computation, and the windows that show it."""
+
+    def __init__(self, key, desk):
+        self.key, self.desk = key, desk
+        self.run, self.is_autosaved = None, not desk.draft.is_book
+        self.check_s, self.saved_s, self.refusal = 0.0, None, ""
+        self._windows, self._tasks = set(), {}
+
+    @property
+    def source(self):
+        """Folder or workbook of the job."""
+        return self.desk.draft.source
+
+    @property
+    def is_computing(self):
+        """Whether a computation has not ended."""
+        return self.run is not None and self.run.is_active
+
+    # ---- windows
+
+    def subscribe(self):
+        """New queue of the events for a window."""
+        queue = asyncio.Queue(MOST_WAITING)
+        self._windows.add(queue)
+        return queue
+
+    def unsubscribe(self, queue):
+        """Forget a window."""
+        self._windows.discard(queue)
+
+    def publish(self):
+        """Notify all windows of a change; a window asks for its differences."""
+        for queue in self._windows:
+            with suppress(asyncio.QueueFull):
+                queue.put_nowait("changed")
+
+    # ---- check and save after edits
+
+    def follow_edit(self):
+        """Check after an edit, at once if that is quick, and save after a pause."""
+        if self.check_s < QUICK_CHECK_S:
+            began = time.monotonic()
+            self.desk.outcome  # noqa: B018  the check is kept
+            self.check_s = time.monotonic() - began
+        elif "check" not in self._tasks:
+            self._start("check", self._check_later())
+        if self.is_autosaved:
+            self._cancel("save")
+            self._start("save", self._save_later())
+        self.publish()
+
+    def _start(self, name, work):
+        task = asyncio.get_running_loop().create_task(work)
+        self._tasks[name] = task
+        task.add_done_callback(lambda done: self._forget(name, done))
+
+    def _forget(self, name, task):
+        if self._tasks.get(name) is task:
+            del self._tasks[name]
+
+    def _cancel(self, name):
+        task = self._tasks.pop(name, None)
+        if task is not None:
+            task.cancel()
+
+    async def check(self):
+        """Make the full check of the present revision, in a thread, and keep it."""
+        desk = self.desk
+        while desk.present_check is None:
+            revision, began = desk.draft.revision, time.monotonic()
+            try:
+                check = await asyncio.to_thread(desk.draft.check)
+            except Exception:
+                # An edit during the check may mix two states; then the check is repeated.
+                if revision == desk.draft.revision:
+                    raise
+                continue
+            self.check_s = time.monotonic() - began
+            desk.keep_check(check, revision)
+
+    async def _check_later(self):
+        await self.check()
+        self.publish()
+
+    async def _save_later(self):
+        await asyncio.sleep(SAVE_S)
+        self.save()
+        self.publish()
+
+    def save(self):
+        """Write the files; a refusal is kept for the windows. Return whether all is saved."""
+        check = self.desk.present_check
+        try:
+            self.desk.save()
+        except Exception as error:  # a refusal of the desk has its text in the language
+            self.refusal = str(error)
+            return False
+        if check is not None:
+            self.desk.keep_check(check, self.desk.draft.revision)
+        self.refusal, self.saved_s = "", time.time()
+        return True
+
+    # ---- computing
+
+    def start(self, has_documents=True):
+        """Save the job and start its computation; raises Refusal if it cannot be computed."""
+        if self.is_computing:
+            return
+        prepared = self.desk.prepare_run()
+        self.saved_s = time.time()
+        self.run = WorkerRun(prepared.source, prepared.out, has_documents, self.publish)
+        self.publish()
+
+    def describe(self):
+        """State of the job for all windows."""
+        run = None if self.run is None else self.run.show(self.desk.reader.language)
+        return describe_state(self.desk) | {
+            "run": run,
+            "refusal": self.refusal,
+            "saved_s": self.saved_s,
+            "is_autosaved": self.is_autosaved,
+        }
+
+
+class Site:
+    """Jobs, uploads and folders of a running app.
+
+    Parameters
+    ----------
+    workspace : Path
+        Folder of new jobs.
+    state : Path, optional
+        State folder; by default that of the user.
+    """
+
+    def __init__(self, workspace, state=None):
+        self.workspace = Path(workspace)
+        self.state = Path(state or find_state_folder())
+        self.recent = RecentJobs(self.state)
+        self._paths, self._jobs, self._uploads, self._readers = {}, {}, {}, {}
+        self._places, self._words = {}, {}
+        self._remove_old_uploads()
+
+    def _remove_old_uploads(self):
+        for path in (self.state / "uploads").glob("*"):
+            with suppress(OSError):
+                if time.time() - path.stat().st_mtime > KEPT_UPLOAD_S:
+                    path.unlink()
+
+    def reader(self, language):
+        """`Reader` of a language, which is kept because its words take long to load."""
+        if language not in self._readers:
+            self._readers[language] = Reader(language)
+        return self._readers[language]
+
+    def words(self, language):
+        """Words of the pages in a language, which are kept."""
+        if language not in self._words:
+            self._words[language] = load_words(language)["app"]
+        return self._words[language]
+
+    # ---- jobs
+
+    def add(self, source):
+        """Add a job to the list of recent jobs, and return its identifier."""
+        source = source_of(source).resolve()
+        self.recent.add(source)
+        key = identifier(source)
+        self._paths[key] = source
+        return key
+
+    def list_recent(self):
+        """List of (identifier, RecentJob)."""
+        jobs = self.recent.list()
+        self._paths |= {identifier(job.source): job.source for job in jobs}
+        return [(identifier(job.source), job) for job in jobs]
+
+    def path(self, key):
+        """Path of a listed job, or None."""
+        if key not in self._paths:
+            self.list_recent()
+        return self._paths.get(key)
+
+    def job(self, key, language):
+        """`OpenJob` of an identifier with texts in a language; None if there is no such job."""
+        source = self.path(key)
+        if source is None:
+            return None
+        job = self._jobs.get(key)
+        if job is not None and not job.desk.draft.is_changed and not job.is_computing:
+            try:
+                job.desk.draft.refuse_changed_elsewhere()
+            except InputError:  # another program has changed a file: read the job again
+                job = None
+        if job is None:
+            try:
+                desk = Desk(Draft.open(source), default_folder(source), self.reader(language))
+            except InputError:
+                return None
+            desk.keep_journal(Journal(source, self.state))
+            job = self._jobs[key] = OpenJob(key, desk)
+        job.desk.reader = self.reader(language)
+        return job
+
+    def forget(self, key):
+        """Read a job again when it is next shown, because its files were replaced."""
+        self._jobs.pop(key, None)
+
+    # ---- uploads
+
+    def new_upload(self, name):
+        """New `Upload` without content, and its identifier."""
+        key = secrets.token_hex(12)
+        folder = self.state / "uploads"
+        folder.mkdir(parents=True, exist_ok=True)
+        self._uploads[key] = Upload(folder / f"{key}.bin", Path(name.replace("\\", "/")).name[:120])
+        return key, self._uploads[key]
+
+    def upload(self, key):
+        """`Upload` of an identifier, or None."""
+        upload = self._uploads.get(key)
+        return upload if upload is not None and upload.path.is_file() else None
+
+    # ---- folders
+
+    def list_places(self, key):
+        """Folder of an identifier with its parent and its folders; the roots for "".
+
+        Returns
+        -------
+        path : Path or None
+        places : list of (str, str, bool)
+            Identifier, name, and whether the folder or workbook is a job.
+        """
+        roots = [self.workspace, Path.home()]
+        if key == "":
+            return None, [self._place(root, str(root)) for root in dict.fromkeys(roots)]
+        path = self._places.get(key)
+        if path is None:
+            return None, []
+        places = [self._place(path.parent, "..")] if path not in roots else []
+        with suppress(OSError):
+            for item in sorted(path.iterdir(), key=lambda item: item.name.lower()):
+                is_inside = any(item.resolve().is_relative_to(root.resolve()) for root in roots)
+                is_shown = item.is_dir() or item.suffix.lower() == ".xlsx"
+                if is_inside and is_shown and not item.name.startswith("."):
+                    places.append(self._place(item, item.name))
+        return path, places
+
+    def _place(self, path, name):
+        """Identifier, name, and whether a path is a job."""
+        key = identifier(path)
+        self._places[key] = path
+        try:
+            source_of(path)
+        except InputError:
+            return key, name, False
+        return key, name, True
+
+    def place(self, key):
+        """Path of a listed folder, or None."""
+        return self._places.get(key)
