@@ -1,9 +1,11 @@
 """The app without a browser and without a port: access, pages, edits, imports."""
 
+import io
 import json
 import re
 import shutil
 import time
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -364,6 +366,33 @@ def test_a_job_that_is_gone_is_told(client, site, folder):
     assert load_words("pt-BR")["app"]["states"]["gone"] in page
     client.post(f"/job/{key}/forget", headers=ORIGIN)
     assert "job" not in client.get("/recent").text.split("<tbody>")[-1][:50]
+
+
+@pytest.mark.slow
+def test_results_are_shown_with_quantities(client, site, folder):
+    """The pages of a computed job, without a browser, in its language."""
+    import tankcal
+    from tankcal.report import outputs
+
+    result = tankcal.run(tankcal.load(folder))
+    outputs.write(result, folder / "results", papers=False)
+    key = site.add(folder)
+    page = client.get(f"/job/{key}/results").text
+    assert "Capacidade de" in page
+    for view in ("table", "wall", "budget", "whole"):
+        answer = client.get(f"/job/{key}/view/{view}")
+        assert answer.headers["content-security-policy"].startswith("sandbox allow-scripts;")
+    archive = zipfile.ZipFile(io.BytesIO(client.get(f"/job/{key}/zip").content))
+    assert "record.json" in archive.namelist()
+    answer = client.get(f"/job/{key}/file/capacity.csv?store")
+    assert "attachment" in answer.headers["content-disposition"]
+    page = client.get(f"/job/{key}/quantity?opening.dip_m=x").text
+    assert "aria-describedby" in page
+    assert "&lt;" not in page.split('<form method="get">')[1][:200]
+    with (folder / "points.csv").open("a") as file:
+        file.write("# later\n")
+    page = client.get(f"/job/{key}/results").text
+    assert load_words("pt-BR")["app"]["states"]["stale"] in page
 
 
 # ---- files
