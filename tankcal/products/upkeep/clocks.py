@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-MOST_OFFSET_S, OFFSET_STEP_S = 7200, 30  # searched offsets of two clocks
+MOST_OFFSET_S, OFFSET_STEP_S = 7200, 60  # searched offsets of two clocks
 LEAST_SALES = 30  # for an offset
 MOST_STEP_M3 = 0.3  # change of the stock in a row beyond it: a delivery
 SWITCH_NS = 900 * 10**9  # smallest fall of a local time that is the change of the clock

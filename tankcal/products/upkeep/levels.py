@@ -9,7 +9,7 @@ from tankcal.products.upkeep.clocks import NOT_A_TIME, find_offset_s
 PIECE_NS = 3600 * 10**9  # longest piece of a quiet window
 STUCK_STEPS = 8  # movement of the level, in quanta, that a stuck float has missed
 LINE_ROWS, LINE_M = 6, 1e-9  # a straight line through so many rows is an interpolation
-CLOCK_ROWS = 4000  # rows of a chunk by which the clocks are compared
+CLOCK_ROWS = 1500  # rows of a chunk by which the clocks are compared
 MOST_OFFSET_S = 60.0  # between two clocks; a larger offset causes a warning
 OVERLAP = 400_000  # rows in which a late row is compared with earlier rows
 
