@@ -79,12 +79,17 @@ function whenDipChanges(tell) {
     facts(field(`${id}-more`), pairs);
   };
 
+  /** U, u and k of the volume at a dip: of the row with the larger U; k is null by Monte Carlo. */
+  const uncertaintyAt = ({ row, part }) => {
+    const worse = part && expanded[row + 1] >= expanded[row] ? row + 1 : row;
+    return { worse, U: expanded[worse], u: standard[worse], k: simulated[worse] ? null : factors[worse] };
+  };
+
   const showVolume = (found) => {
     if (found.refusal) return answer("volume", found.refusal, "refused");
     const { row, part } = found;
-    const worse = part && expanded[row + 1] >= expanded[row] ? row + 1 : row;
     const volume = volumeAt(found);
-    const k = simulated[worse] ? null : factors[worse];
+    const { worse, k } = uncertaintyAt(found);
     const pairs = [standardU(standard[worse])];
     if (volume > 0) pairs.push(["relative_U", `${fixed((100 * expanded[worse]) / volume, 3)} %`]);
     if (data.reference_height_m !== null) {
@@ -106,8 +111,10 @@ function whenDipChanges(tell) {
     const [low, high] = [heightAt(below), heightAt(above)];
     const volume = volumeAt(above) - volumeAt(below);
     const stated = statedBetween(low, high);
-    const { u, k } = uncertaintyBetween(low, high);
-    const U = stated ? stated.U : k * u;
+    // Down to the empty tank, a delivery is the volume at its upper dip, with the U of this volume.
+    const isWhole = volumeAt(below) === 0;
+    const { u, k } = isWhole ? uncertaintyAt(above) : uncertaintyBetween(low, high);
+    const U = stated ? stated.U : isWhole ? uncertaintyAt(above).U : k * u;
     const places = U > 0 ? decimalsOf(U) : data.least;
     const pairs = stated ? [] : [standardU(u)];
     if (volume > 0) pairs.push(["relative_U", `${fixed((100 * U) / volume, 3)} %`]);

@@ -14,6 +14,7 @@ from calculator_deliveries import held_against_deliveries
 from draws import draws
 from recalculation import calculators
 
+from tankcal.report.uncertainty.stated import k_of_rows, stated_U_m3
 from tankcal.text.words import load_words
 
 # openpyxl does not know our data bars, and says so each time
@@ -74,6 +75,8 @@ def cases(record):
         pair = sorted((draw.choice(heights), draw.uniform(heights[0], heights[-1])))
         names = ("dip_m", "wanted_volume", "delivery_low_dip", "delivery_high_dip")
         found.append(dict(zip(names, (dip, float(volume), *pair), strict=True)))
+    for case, high in zip(found, (heights[7], between[3]), strict=False):  # the tank is emptied
+        case |= {"delivery_low_dip": heights[0], "delivery_high_dip": high}
     return found
 
 
@@ -155,6 +158,22 @@ def test_ullage_is_the_reference_height_less_the_dip(typed, record, cases):
 
 def test_deliveries_are_those_of_tankcal(typed, tank, cases, figure):
     held_against_deliveries(typed, tank[0].table, cases, figure)
+
+
+def test_emptying_the_tank_has_the_U_of_the_volume(typed, record, cases):
+    """Volume and delivery of a dip have one U and k; at rows with Monte Carlo no k."""
+    heights = record["capacity"]["height_m"]
+    U, k = stated_U_m3(record["capacity"]), k_of_rows(record["capacity"])
+    emptied = [at for at, case in enumerate(cases) if case["delivery_low_dip"] == heights[0]]
+    assert len(emptied) >= 2
+    for at in emptied:
+        high = cases[at]["delivery_high_dip"]
+        row = bisect_right(heights, high) - 1
+        larger = row if high == heights[row] or U[row] > U[row + 1] else row + 1
+        assert typed.line("delivered_U")[at] == pytest.approx(U[larger], rel=1e-9)
+        expected = NONE if k[larger] is None else pytest.approx(k[larger], rel=1e-6)
+        assert typed.line("delivered_k")[at] == expected
+        assert typed.line("delivered_dof")[at] == NONE
 
 
 @pytest.mark.parametrize("state", ["dip_state", "low_dip_state", "high_dip_state"])

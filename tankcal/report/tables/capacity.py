@@ -24,7 +24,6 @@ def capacity_columns(record):
     columns |= {
         "stated_U_m3": U_m3,
         "U_m3": U_m3 if any(U_m3) else [None] * len(U_m3),
-        "k_of_gum": capacity["k"],
         "k": k_of_rows(capacity),
     }
     if "interval" in capacity:  # absent in records of earlier versions
@@ -112,7 +111,7 @@ def capacity_table(record):
             Column("stated_U_m3", "m3", u="stated_U_m3", on="", sheet="expanded_m3", csv="U_m3"),
             Column("by_monte_carlo", nothing="", on=PRINTED, optional=True),
             Column("k", decimals=2, nothing="", on=PRINTED, csv="k", optional=True),
-            Column("k_of_gum", decimals=2, on="", sheet="k_of_gum", width=11),
+            Column("k", decimals=2, nothing="", on="", sheet="k", width=11),
             Column("u_m3", "m3", u="u_m3", on="", sheet="standard_m3", csv="u_m3"),
             Column("area_m2", "L/cm", decimals=1, on="", sheet="litres_per_cm", width=11),
             Column("for_use", text=_mark, nothing="", heading="by_monte_carlo",

@@ -31,7 +31,7 @@ NAMED = {
     "height_m": "height",
     "volume_m3": "volume",
     "stated_U_m3": "U",
-    "k_of_gum": "k",
+    "k": "k",
     "u_m3": "standard_u",
     "area_m2": "litres_per_cm",
     "low_m3": "low",

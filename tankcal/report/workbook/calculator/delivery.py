@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from tankcal.report.workbook.calculator.cells import Line, if_number
+from tankcal.report.workbook.calculator.cells import Line, if_number, quoted
 from tankcal.report.workbook.calculator.coverage import normal, student
 from tankcal.text.digits import LITRE_DECIMALS, NOTHING
 from tankcal.uncertainty import dof_of, least_of, sum_of_fourths
@@ -108,12 +108,35 @@ def combining(table, label):
     ]
 
 
-def results(table):
+# A delivery down to the empty tank is the volume at its upper dip, and has the U of that volume.
+_IS_WHOLE = "[low_dip_volume]=0"
+
+
+def _find_at_high(name):
+    """Return the formula of a column of the table at the upper dip: the row with the larger U."""
+    row, after = "[high_dip_row]", "[high_dip_next]"
+    larger = f"IF(INDEX(capacity_U,{row})>INDEX(capacity_U,{after}),{row},{after})"
+    return f"INDEX(capacity_{name},IF([high_dip_part]=0,{row},{larger}))"
+
+
+def _choose_formula(of_delivery, of_volume):
+    """Return the formula of a value of a delivery, or of its volume if the tank is emptied."""
+    return if_number("[delivery_k]", f"IF({_IS_WHOLE},{of_volume},{of_delivery})")
+
+
+def results(table, words):
     """Return the lines of the result of a delivery (list of Line)."""
     volume = table.volume_m3[table.at] - table.volume_m3[table.low]
     values = {line.key: line.result for line in combining(table, lambda group: "")}
     u, k, dof = values["delivery_u"], values["delivery_k"], values["delivery_dof"]
     U = NOTHING if u == NOTHING else k * u
+    k_of_volume = _find_at_high("k")
+    if table.has_interval:
+        simulated = quoted(words["intervals"]["monte_carlo"])
+        k_of_volume = f'IF({_find_at_high("interval")}="{simulated}",{_NONE},{k_of_volume})'
+    if u != NOTHING and table.volume_m3[table.low] == 0:
+        U, u, dof = table.U_m3[table.at], table.capacity["u_m3"][table.at], NOTHING
+        k = NOTHING if table.k[table.at] is None else table.k[table.at]
     delivered = "[high_dip_volume]-[low_dip_volume]"
     looks = {"unit": "m³", "by": "delivered_U"}
     relative = NOTHING if U == NOTHING or not volume > 0 else U / volume
@@ -130,17 +153,24 @@ def results(table):
         ),
         Line(
             "delivered_U",
-            if_number("[delivery_k]", "[delivery_k]*[delivery_u]"),
+            _choose_formula("[delivery_k]*[delivery_u]", _find_at_high("U")),
             U,
             0,
             strong=True,
             **looks,
         ),
-        Line("delivered_k", "[delivery_k]", k, 2),
-        Line("delivered_u", "[delivery_u]", u, 0, "m³", by="delivered_u"),
+        Line("delivered_k", _choose_formula("[delivery_k]", k_of_volume), k, 2),
+        Line(
+            "delivered_u",
+            _choose_formula("[delivery_u]", _find_at_high("standard_u")),
+            u,
+            0,
+            "m³",
+            by="delivered_u",
+        ),
         Line(
             "delivered_dof",
-            if_number("[delivery_dof]", f'IF([delivery_dof]>{_SHOWN_INFINITE},"∞",[delivery_dof])'),
+            _choose_formula(f'IF([delivery_dof]>{_SHOWN_INFINITE},"∞",[delivery_dof])', _NONE),
             "∞" if endless else dof,
             "[>=100]0;0.0",
         ),

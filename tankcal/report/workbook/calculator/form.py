@@ -80,7 +80,7 @@ def _results(book, table):
         Block("reverse", reverse.results(table)),
     ]
     if table.capacity["inputs"]:
-        blocks.append(Block("delivery", delivery.results(table)))
+        blocks.append(Block("delivery", delivery.results(table, words)))
     return blocks
 
 
