@@ -153,9 +153,24 @@ def _compute(
         warnings = dict.fromkeys((*job.warnings, *adjustment.warnings, *_idle_cluster(cluster)))
     else:
         paths = outputs.write(result, out, show.part, *papers)
-        warnings = (*result.warnings, *_idle_cluster(cluster, result.job.clouds))
+        warnings = _complete_by_letterhead(result.warnings, result.job, papers[0])
+        warnings = (*warnings, *_idle_cluster(cluster, result.job.clouds))
     show.end()
     tell(out, paths, warnings, result, adjustment)
+
+
+def _complete_by_letterhead(warnings, job, letterhead):
+    """Return the warnings, without missing entries of the certificate that a letterhead states."""
+    if letterhead is None:
+        return warnings
+    from tankcal.pipeline.checks.survey import incomplete_certificate
+
+    others = [
+        warning
+        for warning in warnings
+        if getattr(warning.expected, "code", None) != "certificate_incomplete"
+    ]
+    return (*others, *incomplete_certificate(job, has_letterhead=True))
 
 
 def _idle_cluster(cluster, clouds=None):

@@ -222,9 +222,10 @@ def warn_of_undeclared(undeclared):
     return (Problem("uncertainty.csv", text),)
 
 
-def incomplete_certificate(job):
-    """Warning that names the missing entries of a certificate."""
-    missing = missing_entries(job.certificate, job.tank.details.get("location"))
+def incomplete_certificate(job, has_letterhead=False):
+    """Warning that names the missing entries of a certificate, with or without a letterhead."""
+    location = job.tank.details.get("location")
+    missing = missing_entries(job.certificate, location, has_letterhead)
     if not missing:
         return ()
     text = message(
