@@ -157,7 +157,7 @@ def printed_patterns():
                 yield pattern + (".+" if parts[-1][1] is not None else "")
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 def test_output_of_a_command_is_shown_by_a_session_alone():
     """Figures in a block without a session become wrong when a number of an example changes."""
     printed = [re.compile(one) for one in printed_patterns()]

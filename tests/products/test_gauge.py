@@ -678,6 +678,7 @@ CHANGES = {
 }
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("what", CHANGES)
 def test_a_changed_value_is_detected_although_all_hashes_agree(tmp_path, what):
     out = tmp_path / "out"

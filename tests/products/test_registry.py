@@ -105,6 +105,7 @@ def test_help_of_another_distribution_in_the_language(language, line, volume):
     assert "bbl or gal" in done.stdout  # without a translation the English text remains
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_completion_of_another_distribution(shell):
     pytest.importorskip("shtab")

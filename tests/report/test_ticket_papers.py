@@ -232,6 +232,7 @@ def _declare(saved):
         row["origin"] = "declared"
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("change", [_enlarge, _shrink_u, _move_dip, _declare])
 def test_a_changed_ticket_is_detected_although_all_files_agree(tank, tmp_path, change):
     folder = _copy(tank, tmp_path)

@@ -32,6 +32,7 @@ def test_every_item_is_linear_between_its_ends_closed_form():
     assert volume[-1] == pytest.approx(-1.9 + 0.35 + 0.8 - 0.4, abs=1e-14)  # the total
 
 
+@pytest.mark.slow
 @given(st.permutations(ITEMS))
 def test_the_order_of_the_items_does_not_matter(items):
     assert part_of(items).volume_m3(LEVELS) == pytest.approx(

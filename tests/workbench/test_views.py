@@ -28,6 +28,7 @@ DENT = ("dent", 6.46 * np.sin(TURN), 6.46 * np.cos(TURN), 5.225)
 SOUND = ("a", 6.5, 0.0, 5.2)
 OTHER = ("b", -6.44, 0.0, 1.0)
 SPACE = "\N{NO-BREAK SPACE}"
+EACH_LANGUAGE = ["en", *(pytest.param(other, marks=pytest.mark.slow) for other in LANGUAGES[1:])]
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +53,7 @@ def record(result):
     return record_of(result)
 
 
-@pytest.fixture(params=LANGUAGES)
+@pytest.fixture(params=EACH_LANGUAGE)
 def paper(request, record):
     return Paper(record, language=request.param)
 

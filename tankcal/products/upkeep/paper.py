@@ -253,8 +253,8 @@ def _facts(paper):
                              high=paper.height(round(period["highest_m"], 3)))),
         ("sold", paper.number(period["sold_m3"], "m3", decimals=1)),
         ("delivered", paper.number(period["delivered_m3"], "m3", decimals=1)),
-        ("chi2", paper.word("texts.chi2", chi2=paper.number(upkeep["fit"]["chi2"], decimals=0),
-                            dof=upkeep["fit"]["dof"])),
+        ("chi2", paper.word("texts.chi2", dof=upkeep["fit"]["dof"],
+                            chi_square=paper.number(upkeep["fit"]["chi2"], decimals=0))),
         ("note", upkeep["note"] and bearable(upkeep["note"])),
     ]  # fmt: skip
 
