@@ -20,6 +20,7 @@ from draws import draws
 from independent_shells import FAMILIES, NARROW_M, add_measured_bulge, make_shell, settle
 from joined_jobs import outside_job
 from page_figures import figures_of, ratios_agree, shares_agree
+from scipy.stats import binom
 from test_coverage_of_walls import ROWS, Found, judged
 
 from tankcal.errors import TankcalError
@@ -318,21 +319,29 @@ def test_intervals_hold_on_independent_shells_study(tmp_path, figure, method):
     shells = draws(IN_CI if method in LONG else 30, FULL)
     each = study(method, shells, tmp_path, figure)
     assert all(one.found is not None for one in each)
-    assert not any(one.is_silent for one in each)
-    (far,) = figures_of("docs/uncertainty.md", "an error of more than () U is marked DOUBTFUL")
-    assert float(far) == FAR
+    tables, silent, far = map(
+        float,
+        figures_of(
+            "docs/uncertainty.md",
+            "In () simulated surveys, () tables had an error of more than () U without the mark",
+        ),
+    )
+    assert far == FAR
+    # CI allows none; more shells may have as many as the stated share explains
+    allowed = draws(0, binom.isf(1e-3, shells, silent / tables))
+    assert sum(one.is_silent for one in each) <= allowed
     assert min(held_of(each)) > LEAST_HELD - 3 * np.sqrt(LEAST_HELD * (1 - LEAST_HELD) / shells)
     assert width_of(each) < WIDEST * (1 + 3 / np.sqrt(2 * shells))
     *stated, ratio = figures_of(*ROWS_OF_PAGE[method])
-    full, of_untied = map(
+    full, of_untied, of_tangents = map(
         int,
         figures_of(
             "docs/uncertainty.md",
-            "The table is from () shells for each method (() for untied set-ups)",
+            "The table is from () shells for each method (() for untied set-ups, () for tangents)",
         ),
     )
     # half of the drawn shells have the measured bulge, and count for a third of the population
-    full = (of_untied if "untied" in method else full) / 2
+    full = dict(zip(LONG, (of_tangents, of_untied), strict=True)).get(method, full) / 2
     assert shares_agree(held_of(each), stated, shells / 2, full), (held_of(each), stated)
     assert ratios_agree(width_of(each), ratio, shells / 2, full), (width_of(each), ratio)
     low, high = (float(text) / 100 for text in figures_of(*EXPECTED_U[method]))
@@ -343,3 +352,18 @@ def test_intervals_hold_on_independent_shells_study(tmp_path, figure, method):
     inside = np.mean([low <= one.total[1] <= high for one in each])
     full = of_slow if method in LONG else drawn
     assert shares_agree([inside], ["0.5"], shells, full), inside
+
+
+@pytest.mark.slow
+def test_the_silent_errors_are_those_of_the_page(tmp_path):
+    """The shells of the 3090 whose error no mark shows; a model that covers them fails here."""
+    figures = figures_of(
+        "docs/studies/coverage.md",
+        "two of 400 with two rings (() and () U) and one of 400 with three rings (() U)",
+    )
+    shells = (("two", 5281), ("two", 5242), ("three", 5236))
+    for (rings, seed), stated in zip(shells, figures, strict=True):
+        family = FAMILIES[seed % len(FAMILIES)]
+        shell = survey_shell(f"points, {rings} rings", family, seed, tmp_path / "job")
+        assert shell.is_silent
+        assert f"{shell.worst:.1f}" == stated

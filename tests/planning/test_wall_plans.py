@@ -284,6 +284,11 @@ def test_a_further_strap_of_a_tank_that_is_strapped_alone(tmp_path):
         assert np.all(after[1:] < 1.03 * before[1:])
 
 
+def kinds_of(prediction):
+    """Inputs of the predicted table."""
+    return {source.kind for source in prediction.table.sources}
+
+
 @pytest.mark.slow
 def test_what_helps_is_ranked_and_says_what_it_costs(prediction):
     effects = what_helps(prediction.plan, before=prediction)
@@ -291,7 +296,10 @@ def test_what_helps_is_ranked_and_says_what_it_costs(prediction):
     assert [one.relative_u for one in works] == sorted(one.relative_u for one in works)
     adds = [one for one in works if one.change.action in ("add", "repeat")]
     assert all(one.difference <= 1e-9 for one in adds)
-    assert all(one.difference >= -1e-9 for one in works if one.change.action == "drop")
+    # The excess of the hull is the mean of random walls: other seeds change U of this plan by 0.2
+    # to 1.7 %, so a dropped station that hardly matters may seem to lower it.
+    drawn = 0.01 * prediction.relative_u if "tangent_excess" in kinds_of(prediction) else 1e-9
+    assert all(one.difference >= -drawn for one in works if one.change.action == "drop")
     strap = next(one for one in works if (one.change.action, one.change.item) == ("add", "strap"))
     assert strap.change.cost == pytest.approx(15.5 * strap.change.name.count("-"))
 
