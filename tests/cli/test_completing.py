@@ -14,7 +14,7 @@ from tankcal.terminal.showing import speak
 
 pytest.importorskip("shtab")
 LINES = {  # what is typed: what completes its last word (property: read off the parser's help)
-    "tankcal re": {"report", "read-table"},
+    "tankcal re": {"read-table", "register", "report"},
     "tankcal new x --survey t": {"total-station", "tangents", "triangulation"},
     "tankcal new x --kind h": {"horizontal"},
     "tankcal new x --language p": {"pt-BR"},
@@ -55,7 +55,7 @@ PS1='READY> '; fpath=({folder} $fpath); autoload -Uz compinit; compinit -u -D
 setopt nolistbeep noautomenu nolistpacked; LISTMAX=500; echo LO""ADED
 """  # zsh has no door to what it would complete: it is asked in a terminal
 IN_ZSH = {
-    "tankcal re": ("report ", "read-table "),
+    "tankcal re": ("report ", "register ", "read-table "),
     "tankcal new x --survey t": ("total-station", "tangents", "triangulation"),
     "tankcal run my-tank --o": ("--out ", "--only "),
     "tankcal inspect x --rule api": ("api_650", "api_653"),
