@@ -1,9 +1,11 @@
-"""Planning formulas: vertical photographs, close range, focus, diffraction, target size.
+"""Planning formulas: vertical photographs, close range, control, volume, focus, target size.
 
     M = GSD / pixel          Z = f M
     s_X = Z/f sqrt((x/f Z/B s_p)^2 + s_x^2)   s_Y likewise with y     s_Z = Z^2/(f B) s_p
     s_p = sqrt(2) s_x        each stage may use a third of the error of the next
     s = q M s_image          close range
+    K = sqrt(p n / (p n - r))                         control in place of check points
+    s_V^2 = (2 pi R H s_R)^2 + (pi R^2 s_H)^2         cylinder
 
 The formulas hold for the normal case of two vertical photographs. A simulation of the network
 predicts the precision of a tank survey better. No plan uses these functions.
@@ -16,8 +18,8 @@ f is the focal length, N the f-number, and c the largest blur that counts as sha
 distance, m the scale of the image, and M = distance over principal distance. H is the hyperfocal
 distance.
 
-Source: Pessoa 2017 (31-39); Merchant 1982 (thirds); Silva 1995 (20); Ray 2002, Applied Photographic
-Optics, chs. 22 and 6.
+Source: Pessoa 2017 (31-39); Merchant 1982 (thirds); Silva 1995 (7, 8, 20, 61-65); Ray 2002, Applied
+Photographic Optics, chs. 22 and 6.
 """
 
 import numpy as np
@@ -102,6 +104,56 @@ def close_range_sd_m(design, scale, image_sd_mm):
     """
     sd = METRE * _require_positive("image_sd_mm", image_sd_mm)
     return _require_positive("design", design) * _require_positive("scale", scale) * sd
+
+
+def control_factor(points, unknowns, equations=2):
+    """Factor K of Hottier for the differences at control points that took part in an adjustment.
+
+    Differences at control points are too small, because the adjustment fitted to them. By the trace
+    of the residual projection, their mean square is s^2 (p n - r) / (p n), so
+
+        R = K R',    K = sqrt(p n / (p n - r))
+
+    estimates the accuracy without check points. The numerator is derived here; it is illegible in
+    the copy of the source that was read.
+
+    Parameters
+    ----------
+    points : int
+        Number n of control points.
+    unknowns : int
+        Number r of parameters that the control points determine.
+    equations : int, optional
+        Number p of equations of each point.
+
+    Examples
+    --------
+    >>> round(control_factor(points=8, unknowns=6, equations=3), 3)
+    1.155
+    """
+    total = equations * points
+    if not 0 <= unknowns < total:
+        raise ValueError(f"found {unknowns!r} unknowns; expected 0 to {total - 1}, below p n")
+    return float(np.sqrt(total / (total - unknowns)))
+
+
+def cylinder_volume_sd_m3(radius_m, height_m, radius_sd_m, height_sd_m, sections=1):
+    """Standard deviation of the volume of a cylinder from radius and height alone, m3.
+
+    One section: the radius is equal at all heights. More: independent sections of equal height, so
+    that s_R^2 becomes s_R^2 / sections. A table of tankcal has the full covariance instead.
+
+    Examples
+    --------
+    >>> round(cylinder_volume_sd_m3(6.479, 9.5, 0.003, 0.004), 2)
+    1.27
+    """
+    radius, height = (
+        _require_positive("radius_m", radius_m),
+        _require_positive("height_m", height_m),
+    )
+    by_radius = 2 * np.pi * radius * height * radius_sd_m / np.sqrt(sections)
+    return float(np.hypot(by_radius, np.pi * radius**2 * height_sd_m))
 
 
 def focus_for_m(near_m, far_m):

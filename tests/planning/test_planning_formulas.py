@@ -80,3 +80,26 @@ def test_many_points_at_once():
 def test_nonsense_is_refused_by_name(call, name):
     with pytest.raises(ValueError, match=name):
         call()
+
+
+def test_control_factor_restores_the_true_error():
+    # simulation: lines through control points with known errors
+    rng = np.random.default_rng(4)
+    x = np.linspace(0, 1, 6)
+    design = np.column_stack([np.ones(6), x])
+    errors = rng.normal(0, 2.0, (6, 40_000))
+    residuals = errors - design @ np.linalg.lstsq(design, errors, rcond=None)[0]
+    at_control = np.sqrt(np.mean(residuals**2))
+    factor = formulas.control_factor(points=6, unknowns=2, equations=1)
+    assert factor * at_control == pytest.approx(2.0, rel=0.01)
+    with pytest.raises(ValueError, match="expected 0 to 5"):
+        formulas.control_factor(points=6, unknowns=6, equations=1)
+
+
+def test_volume_of_a_cylinder_is_as_published():
+    # published: S 61 to 65, 0.10 % of 1252.8 m3; with five independent sections 0.74 m3
+    sd = formulas.cylinder_volume_sd_m3(6.479, 9.5, 0.003, 0.004)
+    assert sd**2 == pytest.approx(1.624, abs=5e-4)
+    assert sd / (np.pi * 6.479**2 * 9.5) == pytest.approx(1.0e-3, abs=5e-5)
+    five = formulas.cylinder_volume_sd_m3(6.479, 9.5, 0.003, 0.004, sections=5)
+    assert five == pytest.approx(0.74, abs=5e-3)
