@@ -10,7 +10,6 @@ from tankcal.job.certificate_entries import missing_entries
 from tankcal.job.plausibility_table import CODES
 from tankcal.methods.base import methods
 from tankcal.report import blocks
-from tankcal.report.plate import draw_plate
 from tankcal.report.scope import find_capability, is_outside_scope
 from tankcal.report.tables.facts import (
     CERTIFICATE,
@@ -189,6 +188,8 @@ def plate(paper):
 
     The certificate shows the plate of a rule that was compared with its text only.
     """
+    from tankcal.report.plate import draw_plate  # with matplotlib, for papers only
+
     rule = (paper.record.get("rule") or {}).get("rule", {})
     if not rule.get("plate"):
         return []

@@ -16,6 +16,7 @@ from background import heed_ctrl_c
 from browser import THIS_MACHINE, Browser
 from job_builder import write_job
 
+from tankcal.cli import main
 from tankcal.text.words import load_words
 
 pytestmark = pytest.mark.slow
@@ -191,14 +192,17 @@ def test_edits_are_checked_saved_and_computed(browser, folder):
 
 
 def test_a_run_is_stopped_and_leaves_earlier_results(browser, folder, address):
+    record = folder / "results" / "record.json"
+    if not record.is_file():  # the test that computes it was left out
+        assert main(["run", str(folder), "--no-papers", "--quiet"]) == 0
     follow(browser, 'nav a[href$="results"]')
-    earlier = (folder / "results" / "record.json").read_bytes()
+    earlier = record.read_bytes()
     follow(browser, "#start button")
     browser.wait_for("document.querySelector('#step').textContent", SLOW_S)
     follow(browser, "#progress button")
     stopped = load_words("pt-BR")["app"]["stopped"]
     browser.wait_for(f"document.querySelector('#run').innerText.includes({stopped!r})")
-    assert (folder / "results" / "record.json").read_bytes() == earlier
+    assert record.read_bytes() == earlier
 
 
 def test_two_windows_show_the_same_job(browser, folder, address):
