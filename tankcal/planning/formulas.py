@@ -140,8 +140,9 @@ def control_factor(points, unknowns, equations=2):
 def cylinder_volume_sd_m3(radius_m, height_m, radius_sd_m, height_sd_m, sections=1):
     """Standard deviation of the volume of a cylinder from radius and height alone, m3.
 
-    One section: the radius is equal at all heights. More: independent sections of equal height, so
-    that s_R^2 becomes s_R^2 / sections. A table of tankcal has the full covariance instead.
+    With a single section, its radius holds for every height. Further sections are independent and
+    of equal height, so that s_R^2 becomes s_R^2 / sections. A table of tankcal has the full
+    covariance instead.
 
     Examples
     --------

@@ -188,7 +188,7 @@ def plate(paper):
 
     The certificate shows the plate of a rule that was compared with its text only.
     """
-    from tankcal.report.plate import draw_plate  # with matplotlib, for papers only
+    from tankcal.report.plate import draw_plate  # loads matplotlib
 
     rule = (paper.record.get("rule") or {}).get("rule", {})
     if not rule.get("plate"):
