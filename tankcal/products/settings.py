@@ -1,7 +1,9 @@
-"""Settings of a product: a TOML file with sections of declared keys."""
+"""Settings of a product: a TOML file with sections of declared keys, and its empty files."""
 
 from collections.abc import Mapping
+from pathlib import Path
 
+from tankcal.errors import InputError, Problem
 from tankcal.job.entries import read_section, unknown_section
 from tankcal.job.folder import MAX_SETTINGS_BYTES, declared_marks, flattened, read_toml
 from tankcal.job.tables import read_bytes
@@ -63,3 +65,74 @@ def fill_blanks(values, defaults):
     return {
         key: default if values[key] is None else values[key] for key, default in defaults.items()
     }
+
+
+def write_empty_files(folder, texts, exists):
+    """Write the empty files of a product.
+
+    Parameters
+    ----------
+    folder : path
+        Created if missing.
+    texts : dict of {str: str}
+        {name of a file: content}.
+    exists : Message
+        The problem of a file that is there already; none is then written.
+
+    Returns
+    -------
+    list of str
+        Names of the files.
+
+    Raises
+    ------
+    InputError
+        If a file exists.
+    """
+    folder = Path(folder)
+    existing = [name for name in texts if (folder / name).exists()]
+    if existing:
+        raise InputError([Problem(name, exists) for name in existing])
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    return list(texts)
+
+
+def empty_settings(sections, notes, heading, fill_in, asked=()):
+    """Return the text of a TOML file with every key blank, and its note beside it.
+
+    Parameters
+    ----------
+    sections : dict
+        {section: tuple of Field}; the section csv is left out.
+    notes : dict
+        {section: {key: note}}.
+    heading : str
+        Comment of the first line.
+    fill_in : str
+        Words before the notes of the keys to fill in.
+    asked : collection of (str, str), optional
+        Section and key to fill in although a Field does not require it.
+
+    Returns
+    -------
+    str
+    """
+    lines = [f"# {heading}"]
+    for section, fields in sections.items():
+        if section == "csv":
+            continue
+        lines += ["", f"[{section}]"]
+        for field in fields:
+            choices = f" ({', '.join(field.choices)})" if field.choices else ""
+            ask = f"{fill_in}: " if field.required or (section, field.name) in asked else ""
+            setting = f'{field.name} = ""'
+            lines.append(f"{setting:<32} # {ask}{notes[section][field.name]}{choices}")
+    return "\n".join(lines) + "\n"
+
+
+def empty_table(columns, notes, heading):
+    """Return the text of a CSV file without rows: notes {column: note}, and the headings."""
+    lines = [f"# {heading}", *(f"# {field.name}: {notes[field.name]}" for field in columns)]
+    return "\n".join([*lines, ",".join(field.name for field in columns)]) + "\n"

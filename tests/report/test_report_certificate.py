@@ -68,13 +68,16 @@ def test_every_field_of_the_contract_is_printed(example_record, tmp_path):
     """A key that a job may give stands somewhere on the certificate."""
     record = json.loads(example_record.read_text(encoding="utf-8"))
     given = {field.name: f"value of {field.name}" for field in KEYS["certificate"]}
-    given |= {"date_of_issue": "2024-11-21", "survey_end": "2024-11-21"}
+    dates = dict.fromkeys(("date_of_issue", "survey_end", "next_verification"), "2024-11-21")
+    given |= dates
     record["job"]["certificate"] = given | {"permit": "OS 7"}
+    rule = {"rule": given["next_verification_rule"], "clause": "1", "years": 10.0}
+    record["job"]["next_verification"] = {"date": "2024-11-21"} | rule
     path = tmp_path / "record.json"
     path.write_text(json.dumps(record), encoding="utf-8")
     printed = "\n".join(texts(paper_blocks(path)))
     for name, value in given.items():
-        shown = "21 November 2024" if name in ("date_of_issue", "survey_end") else value
+        shown = "21 November 2024" if name in dates else value
         assert shown in printed, name
     assert "OS 7" in printed
     assert "value of authorised_by, value of authorised_role" in printed
@@ -149,10 +152,12 @@ def test_user_text_is_printed_literally(short_record, tmp_path):
     """typst, LaTeX, HTML and spreadsheet markup in every text field of the job."""
     record = json.loads(short_record.read_text(encoding="utf-8"))
     short = {"authorised_by": "#a *b* $c$", "authorised_role": "<i>"}  # in a narrow column
-    dates = {"date_of_issue", "survey_end", "next_verification", "next_verification_rule"}
+    dates = {"date_of_issue", "survey_end", "next_verification"}
     names = {field.name for field in KEYS["certificate"]} - dates - set(short)
     fields = {name: f"{name} {HARD}" for name in sorted(names - {"notice"})}
     record["job"]["certificate"] = fields | short | {"notice": "#N *x*"}
+    rule = {"rule": fields["next_verification_rule"], "clause": "1", "years": 10.0}
+    record["job"]["next_verification"] = {"date": "2024-11-21"} | rule
     details = ("owner", "location", "product", "manufacturer", "construction", "remarks")
     record["job"]["tank"]["details"] = {key: f"{key} {HARD}" for key in details}
     for course in record["courses"]:

@@ -27,9 +27,7 @@ from scipy.sparse import csr_array, diags_array
 
 from tankcal.tank.liquid.adjustment import Effect
 
-MOST_ROWS = (
-    3000  # largest number of rows of liquid.csv; the tests of all dips and batches are dense
-)
+MOST_ROWS = 3000  # rows of liquid.csv at most; the tests of all dips and batches are dense
 EMPTY = -1  # start of a step in the empty, dry tank, in place of the index of a dip
 EXPANSION_STEP = 1e-3  # relative step of the expansion, in which misclosures are nearly linear
 
