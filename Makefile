@@ -13,7 +13,7 @@ export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
-demo: $(VENV)/beginner ## run the example, or any job: make demo JOB=path/to/job
+demo: $(VENV)/base ## run the example, or any job: make demo JOB=path/to/job
 ifdef JOB
 	$(BIN)/tankcal run "$(JOB)"
 else
@@ -88,17 +88,13 @@ wheel: $(VENV)/release ## wheel and source archive in dist/, built twice and com
 	.ci/wheel $(TAG)
 
 $(VENV)/base: pyproject.toml constraints.txt
-	@echo "setting up $(VENV): Python packages are fetched once, which takes some minutes"
-	test -x $(BIN)/python || python3 -m venv $(VENV)
-	$(BIN)/pip install --editable .
-	touch $@
+	@echo "setting up $(VENV), once: about 35 packages, 125 MB to fetch"
+	@test -x $(BIN)/python || python3 -m venv $(VENV)
+	@$(BIN)/python .ci/install.py --editable .
+	@touch $@
 
-$(VENV)/beginner: $(VENV)/base # tankcal notebook, which the first pages name
-	$(BIN)/pip install --editable '.[lab]'
-	touch $@
-
-$(VENV)/full: $(VENV)/beginner
-	$(BIN)/pip install --quiet --editable '.[test,check,images,clouds,cluster,lab]'
+$(VENV)/full: $(VENV)/base
+	$(BIN)/pip install --quiet --editable '.[test,check,images,clouds,cluster,lab,fast]'
 	$(BIN)/python -m tankcal.cli.kernels
 	touch $@
 
