@@ -357,7 +357,7 @@ def test_intervals_hold_on_independent_shells_study(tmp_path, figure, method):
 
 @pytest.mark.slow
 def test_the_silent_errors_are_those_of_the_page(tmp_path):
-    """The shells of the 3090 whose error no mark shows; a model that covers them fails here."""
+    """The shells of the 3300 whose error no mark shows; a model that covers them fails here."""
     figures = figures_of(
         "docs/studies/coverage.md",
         "two of 400 with two rings (() and () U) and one of 400 with three rings (() U)",

@@ -96,7 +96,7 @@ OF_GREAT_CIRCLES = (  # strapping does not determine these amplitudes: log_sd is
     Departure("ovality", "oval", 0.0, 0.0, 2e-3, 0.0),
     Departure("seams", "local", 0.4, 0.0, 2e-3, 0.0),
     Departure("seams", "local", 1.2, 0.0, 2e-3, 0.0),
-    Departure("legs", "band", 0.15, 0.0, 2.5e-3, 0.0),
+    Departure("legs", "band", 0.15, 0.0, 1.8e-3, 0.0),
 )
 
 

@@ -117,7 +117,7 @@ SPHERE = (
     number(
         "form_mm",
         "only with great_circles: standard deviation of the radius about the ellipsoid (plates,"
-        " seams, legs), millimetres; blank: 4.3",
+        " seams, legs), millimetres; blank: 3.9",
         0,
         500,
         kinds=SPHERE_ONLY,
