@@ -41,7 +41,7 @@ def found_of(rng, family):
 
 
 def study(balls, figure, seed):
-    """Held shares of totals, of rows and of totals with columns, U over 1.96 rms errors of totals."""
+    """Held totals, rows and totals with columns; mean U over 1.96 rms errors of the totals."""
     rng, every = np.random.default_rng(seed), []
     for family in SPHERES:
         found = [found_of(rng, family) for _ in range(balls)]
