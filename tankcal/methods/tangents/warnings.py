@@ -1,6 +1,7 @@
 """Warnings about tangents: few limbs, wrong heights, disturbed set-ups."""
 
 import numpy as np
+from scipy.stats import norm
 
 from tankcal.errors import Problem
 from tankcal.geometry.shell import course_of
@@ -21,8 +22,9 @@ from tankcal.pipeline.checks.wall import (
 )
 from tankcal.pipeline.wall.finding import joints_of
 
-MANY_LEVELS = 0.5  # share of wrong levels above which the heights as a whole are wrong
 TOGETHER = 0.5  # limit of a whole set-up, relative to the limit of a single sight
+SLIDES = 3.0  # standard deviations by which a wave of the wall may move a point of contact
+LEAST_SLOPE = 0.1  # of a sight; the height of a flatter one does not show where it touches
 LOST = 0.5  # share of used tangents below which a set-up is reported
 WAVES = np.arange(2, 9)  # numbers of waves round a wall, longer than a plate
 
@@ -126,13 +128,36 @@ def wave_in_radius(normal_rad):
 
 
 def _check_heights(job, touching):
-    """Problems of tangents that touch the wall away from their level or on another course."""
+    """Problems of tangents that touch the wall away from their level or on another course.
+
+    The height of a contact is that of the sight at the tangency point of the circle. On a wall with
+    waves the contact slides along the sight, so a steep sight touches at another height.
+    """
     tangents, names = job.tangents, [course.name for course in job.courses]
     height = touching.points.xyz_m[:, 2] - job.datum.bottom_z_m
     off_m = height - job.datum.plate_level_m - tangents.level_m
     course_index = course_of(height, joints_of(job))
     most_m, setup = limits_of(TANGENT_LIMITS)["level_m"], np.array(tangents.setup)
-    is_far, off_by_setup = np.abs(off_m) > most_m, _high_setups(setup, off_m, most_m)
+    is_known = np.isfinite(off_m)
+    if not is_known.any():
+        return
+    common_m = float(np.median(off_m[is_known]))
+    if abs(common_m) > most_m:
+        text = message(
+            "tangents_off_levels",
+            "the tangents touch the wall {off:+.2f} m from their levels: are bottom_z_m, the"
+            " heights of the stations or those of the instruments wrong?",
+            off=common_m,
+        )
+        yield Problem(tangents.file, text, None, "level_m")
+        return
+    rise_m = touching.points.xyz_m[:, 2] - touching.poses.xyz_m[touching.pose, 2]
+    slope = np.maximum(np.abs(rise_m) / touching.length_m, LEAST_SLOPE)
+    # The lowest quarter, because half of the levels may be exchanged.
+    quarter_m = np.quantile(np.abs(off_m - common_m)[is_known] / slope[is_known], 0.25)
+    slide_m = quarter_m / norm.ppf(0.625)
+    is_far = np.abs(off_m) > most_m + SLIDES * slide_m * slope
+    off_by_setup = _high_setups(setup, off_m, most_m)
     for name, by_m in off_by_setup.items():
         text = message(
             "tangents_of_high_setup",
@@ -151,15 +176,6 @@ def _check_heights(job, touching):
             names[int(course_index[place])],
         )
         places_by_key.setdefault(key, []).append(place)
-    if len(places_by_key) > MANY_LEVELS * len(tangents.levels[1]):
-        text = message(
-            "tangents_off_levels",
-            "the tangents touch the wall {off:+.2f} m from their levels: are bottom_z_m, the"
-            " heights of the stations or those of the instruments wrong?",
-            off=float(np.median(off_m[is_far])),
-        )
-        yield Problem(tangents.file, text, None, "level_m")
-        return
     for (course, level, other_course), places in places_by_key.items():
         text = message(
             "tangents_at_other_level",
