@@ -24,7 +24,7 @@ from tankcal.pipeline.wall.finding import joints_of
 
 TOGETHER = 0.5  # limit of a whole set-up, relative to the limit of a single sight
 SLIDES = 3.0  # standard deviations by which a wave of the wall may move a point of contact
-LEAST_SLOPE = 0.1  # of a sight; the height of a flatter one does not show where it touches
+LEAST_SLOPE = 0.1  # of a sight; flatter sights do not show where they touch
 LOST = 0.5  # share of used tangents below which a set-up is reported
 WAVES = np.arange(2, 9)  # numbers of waves round a wall, longer than a plate
 
