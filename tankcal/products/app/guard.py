@@ -4,7 +4,8 @@ A web page of another site must not reach the app, and neither must other users 
 
 - Host is a name of this server (a foreign name may point to 127.0.0.1, DNS rebinding);
 - a request that changes something has our own Origin;
-- a token in the first address becomes a cookie and leaves the address;
+- a token in the first address becomes a cookie and leaves the address; an app with users has
+  sessions instead, which begin with name and password;
 - pages run no script but those of the app; pages of the report run in a sandbox.
 """
 
@@ -14,11 +15,13 @@ from urllib.parse import parse_qsl, urlencode
 
 from starlette.responses import PlainTextResponse, RedirectResponse
 
+from tankcal.products.app.people import LOCAL
 from tankcal.text.shipped import LANGUAGES
 
 TOKEN_BYTES = 18  # 144 bits
 LANGUAGE_COOKIE = "tankcal-language"
 SAFE_METHODS = ("GET", "HEAD")
+OPEN_PATHS = ("/login", "/look")  # without a session
 MISDIRECTED, FORBIDDEN = 421, 403
 PAGE_POLICY = (
     "default-src 'self'; img-src 'self' data:; object-src 'none'; base-uri 'none'; "
@@ -58,11 +61,15 @@ class Guard:
         Name of the cookie; cookies are not separated by port, so that it contains the port.
     is_secure : bool
         Whether the browser uses TLS.
+    people : People, optional
+        Users, whose sessions replace the token.
+    base : str
+        Prefix of all addresses.
     """
 
-    def __init__(self, app, hosts, token, cookie, is_secure=False):
+    def __init__(self, app, hosts, token, cookie, is_secure=False, people=None, base=""):
         self.app, self.hosts, self.token, self.cookie = app, hosts, token, cookie
-        self.is_secure = is_secure
+        self.is_secure, self.people, self.base = is_secure, people, base
 
     async def __call__(self, scope, receive, send):
         if scope["type"] == "lifespan":  # start and end of the server
@@ -86,6 +93,9 @@ class Guard:
         is_change = scope["method"] not in SAFE_METHODS
         if is_change and values.get("origin", "").lower() != f"{scheme}://{host}":
             return PlainTextResponse("unknown origin", MISDIRECTED)
+        scope["cookie"], scope["person"] = self.cookie, LOCAL
+        if self.people is not None:
+            return self._refuse_stranger(scope, values)
         query = parse_qsl(scope["query_string"].decode("latin-1"))
         offered = [value for name, value in query if name == "token"]
         if offered and not is_change and self._is_token(offered[0]):
@@ -105,6 +115,20 @@ class Guard:
                 "Open the address that tankcal printed; it contains a token.", FORBIDDEN
             )
         return None
+
+    def _refuse_stranger(self, scope, values):
+        """Response to a request without a session: the page that begins it, or None."""
+        person = self.people.person(self._cookie_of(values))
+        if person is not None:
+            scope["person"] = person
+            return None
+        path = scope["path"].removeprefix(self.base)
+        scope["person"] = None
+        if path in OPEN_PATHS or path.startswith("/static/"):
+            return None
+        if scope["method"] in SAFE_METHODS and "text/html" in values.get("accept", ""):
+            return RedirectResponse(f"{self.base}/login?{urlencode({'back': scope['path']})}", 303)
+        return PlainTextResponse("Log in first.", FORBIDDEN)
 
     def _is_token(self, text):
         return secrets.compare_digest(text.encode(), self.token.encode())

@@ -2,12 +2,10 @@
 
 import asyncio
 import hashlib
-import json
-import shutil
 from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from urllib.parse import parse_qs, quote
+from urllib.parse import quote
 
 import jinja2
 from markupsafe import Markup
@@ -24,13 +22,44 @@ from starlette.responses import (
 from starlette.routing import Mount, Route
 
 from tankcal.errors import InputError, TankcalError
+from tankcal.products.app.drop_pages import compare_upload, show_upload, view_record
 from tankcal.products.app.guard import LANGUAGE_COOKIE, REPORT_POLICY
-from tankcal.text.shipped import DEFAULT, LANGUAGES, nearest_language, shipped_folder
+from tankcal.products.app.office_pages import (
+    create_from_chart,
+    draw_chart,
+    end_session,
+    send_register,
+    show_chart,
+    show_login,
+    show_register,
+    start_session,
+    withdraw_certificate,
+)
+from tankcal.products.app.pages import (
+    THEME_COOKIE,
+    THEMES,
+    find_asked_fields,
+    job_of,
+    language_of,
+    list_results,
+    permit,
+    person_of,
+    read_action,
+    read_form,
+    read_paper,
+    redirect,
+    render,
+    render_job,
+    show_error,
+    show_failure,
+    show_refusal,
+    upload_of,
+)
+from tankcal.products.app.people import APPROVE, EDIT, RUN
+from tankcal.products.app.review_pages import decide, issue_certificate, show_review, take_over
+from tankcal.text.shipped import LANGUAGES, shipped_folder
 
 FOLDER = Path(__file__).parent
-THEME_COOKIE = "tankcal-theme"
-THEMES = ("", "light", "dark")  # "": that of the system
-MOST_BODY = 20_000_000  # bytes of a form or an action; a paste of 5000 rows has less than 1 MB
 PING_S = 15  # interval of signs of life to a window
 EXAMPLES = ("silva-1995", "strapping", "sphere-straps")  # offered as copies
 SURVEYS = {  # ways of measuring that a new job offers, {kind: {code: survey}}
@@ -78,36 +107,52 @@ def make_application(site, base=""):
         Route("/look", choose_look, methods=post),
         Route("/static/{version:str}/{name:str}", send_static, methods=get),
         Route("/new", show_new, methods=get),
-        Route("/new", create, methods=post),
-        Route("/example/{name:str}", copy_example, methods=post),
+        Route("/new", permit(EDIT, create), methods=post),
+        Route("/example/{name:str}", permit(EDIT, copy_example), methods=post),
         Route("/open", show_places, methods=get),
-        Route("/open", open_place, methods=post),
-        Route("/upload", upload, methods=post),
+        Route("/open", permit(EDIT, open_place), methods=post),
+        Route("/upload", permit(EDIT, upload), methods=post),
         Route("/import/{upload:str}", show_upload, methods=get),
-        Route("/import/{upload:str}/job", open_workbook, methods=post),
+        Route("/import/{upload:str}/job", permit(EDIT, open_workbook), methods=post),
         Route("/import/{upload:str}/view", view_record, methods=get),
+        Route("/import/{upload:str}/compare/{key:str}", compare_upload, methods=get),
         Route("/field-sheet/{survey:str}", send_field_sheet, methods=get),
         Route("/keys", show_keys, methods=get),
         Route(f"{job}/", show_settings, methods=get),
-        Route(f"{job}/forget", forget, methods=post),
+        Route(f"{job}/forget", permit(EDIT, forget), methods=post),
         Route(f"{job}/table/{name}", show_table, methods=get),
         Route(f"{job}/grid/{name}", send_grid, methods=get),
         Route(f"{job}/changes", send_changes, methods=get),
         Route(f"{job}/events", send_events, methods=get),
-        Route(f"{job}/act", act, methods=post),
-        Route(f"{job}/add-table", add_table, methods=post),
-        Route(f"{job}/recover", recover, methods=post),
+        Route(f"{job}/act", permit(EDIT, act), methods=post),
+        Route(f"{job}/add-table", permit(EDIT, add_table), methods=post),
+        Route(f"{job}/recover", permit(EDIT, recover), methods=post),
         Route(f"{job}/problems", show_problems, methods=get),
         Route(f"{job}/import/{{upload:str}}", show_import, methods=get),
-        Route(f"{job}/import/{{upload:str}}", import_upload, methods=post),
+        Route(f"{job}/import/{{upload:str}}", permit(EDIT, import_upload), methods=post),
         Route(f"{job}/results", show_results, methods=get),
-        Route(f"{job}/run", run, methods=post),
-        Route(f"{job}/stop", stop, methods=post),
-        Route(f"{job}/overrule", overrule, methods=post),
+        Route(f"{job}/run", permit(RUN, run), methods=post),
+        Route(f"{job}/stop", permit(RUN, stop), methods=post),
+        Route(f"{job}/overrule", permit(EDIT, overrule), methods=post),
         Route(f"{job}/file/{name}", send_file, methods=get),
         Route(f"{job}/view/{name}", send_view, methods=get),
         Route(f"{job}/zip", send_zip, methods=get),
         Route(f"{job}/quantity", show_quantity, methods=get),
+        Route(f"{job}/what-if", show_what_if, methods=get),
+        Route(f"{job}/review", show_review, methods=get),
+        Route(f"{job}/review", permit("", decide), methods=post),
+        Route(f"{job}/issue", permit(APPROVE, issue_certificate), methods=post),
+        Route(f"{job}/take-over", permit(EDIT, take_over), methods=post),
+        Route("/run-all", permit(RUN, run_all), methods=post),
+        Route("/register", show_register, methods=get),
+        Route("/register.csv", send_register, methods=get),
+        Route("/register/withdraw", permit(APPROVE, withdraw_certificate), methods=post),
+        Route("/chart", show_chart, methods=get),
+        Route("/chart/job", permit(EDIT, create_from_chart), methods=post),
+        Route("/chart.pdf", draw_chart, methods=get),
+        Route("/login", show_login, methods=get),
+        Route("/login", start_session, methods=post),
+        Route("/logout", end_session, methods=post),
     ]
     handlers = {
         HTTPException: show_error,
@@ -129,102 +174,7 @@ def make_application(site, base=""):
     return application
 
 
-# ---- language, pages, errors
-
-
-def language_of(request):
-    """Language of the pages: that of the cookie, or the first known language of the browser."""
-    chosen = request.cookies.get(LANGUAGE_COOKIE)
-    if chosen in LANGUAGES:
-        return chosen
-    for part in request.headers.get("accept-language", "").split(","):
-        language = nearest_language(part.split(";")[0])
-        if language:
-            return language
-    return DEFAULT
-
-
-def render(request, template, status=200, **values):
-    """Render a page."""
-    state, language = request.app.state, language_of(request)
-    theme = request.cookies.get(THEME_COOKIE, "")
-    common = {
-        "w": state.site.words(language),
-        "base": state.base,
-        "language": language,
-        "languages": LANGUAGES,
-        "theme": theme if theme in THEMES else "",
-        "version": state.version,
-        "here": request.url.path + (f"?{request.url.query}" if request.url.query else ""),
-        "quote": lambda text: quote(text, safe=""),
-    }
-    page = state.templates.get_template(f"{template}.html").render(common | values)
-    return HTMLResponse(page, status)
-
-
-async def show_error(request, error):
-    """Page of an error of HTTP."""
-    if request.method == "GET":
-        return render(request, "error", error.status_code, code=error.status_code, lines=[])
-    return JSONResponse({"error": str(error.detail)}, error.status_code)
-
-
-async def show_failure(request, error):
-    """Page of an error in the program; the server prints its traceback."""
-    line = f"{type(error).__name__}: {error}"
-    if "json" in request.headers.get("content-type", ""):
-        return JSONResponse({"error": line}, 500)
-    return render(request, "error", 500, code=500, lines=[line])
-
-
-async def show_refusal(request, error):
-    """Answer to a request that the model refuses: its messages in the language."""
-    say = request.app.state.site.reader(language_of(request)).say
-    texts = [say(text) for text in getattr(error, "texts", [str(error)])]
-    lines = [line for text in texts for line in text.splitlines()]
-    if "json" in request.headers.get("content-type", ""):
-        return JSONResponse({"error": "\n".join(lines)}, 409)
-    return render(request, "error", 409, code=409, lines=lines)
-
-
-def job_of(request):
-    """`OpenJob` of the request; 404 if it is not in the list."""
-    job = request.app.state.site.job(request.path_params["key"], language_of(request))
-    if job is None:
-        raise HTTPException(404)
-    return job
-
-
-async def read_body(request):
-    """Body of a request, 413 if it is too large."""
-    content = b""
-    async for part in request.stream():
-        content += part
-        if len(content) > MOST_BODY:
-            raise HTTPException(413)
-    return content
-
-
-async def read_form(request):
-    """Fields of a form, {name: last value}."""
-    content = (await read_body(request)).decode("utf-8", "replace")
-    return {name: values[-1] for name, values in parse_qs(content, True).items()}
-
-
-async def read_action(request):
-    """Object of a request with JSON; 400 for other content."""
-    try:
-        content = json.loads(await read_body(request))
-    except ValueError:
-        content = None
-    if not isinstance(content, dict):
-        raise HTTPException(400)
-    return content
-
-
-def redirect(request, path):
-    """Redirection to a page of the app."""
-    return RedirectResponse(f"{request.app.state.base}{path}", 303)
+# ---- language, theme, scripts and styles
 
 
 async def choose_look(request):
@@ -346,25 +296,6 @@ async def upload(request):
     return JSONResponse({"address": f"{request.app.state.base}{place}"})
 
 
-def upload_of(request):
-    """`Upload` of the request; 404 if there is none."""
-    stored = request.app.state.site.upload(request.path_params["upload"])
-    if stored is None:
-        raise HTTPException(404)
-    return stored
-
-
-async def show_upload(request):
-    """Kind of an uploaded file, and the jobs to which it may belong."""
-    from tankcal.products.desk.proposals import kind_of
-
-    stored, site = upload_of(request), request.app.state.site
-    kind = await asyncio.to_thread(lambda: kind_of(stored.path.read_bytes()))
-    jobs = await asyncio.to_thread(site.list_recent)
-    key = request.path_params["upload"]
-    return render(request, "upload", kind=str(kind), name=stored.name, jobs=jobs, upload=key)
-
-
 async def open_workbook(request):
     """Copy an uploaded job workbook to the workspace and open it."""
     from tankcal.products.desk.jobs import free_folder
@@ -374,22 +305,6 @@ async def open_workbook(request):
     folder.mkdir(parents=True)
     (folder / "job.xlsx").write_bytes(stored.path.read_bytes())
     return redirect(request, f"/job/{site.add(folder)}/")
-
-
-async def view_record(request):
-    """Page of an uploaded record, without a job."""
-    stored, language = upload_of(request), language_of(request)
-
-    def make():
-        from tankcal.products.desk.result_pages import whole_page
-        from tankcal.report.paper import Paper
-
-        with TemporaryDirectory() as folder:  # the reader knows a record by its name
-            path = shutil.copy(stored.path, Path(folder) / "record.json")
-            return whole_page(Paper(path, language=language))
-
-    html = await asyncio.to_thread(make)
-    return HTMLResponse(html, headers={"Content-Security-Policy": REPORT_POLICY})
 
 
 async def send_field_sheet(request):
@@ -415,25 +330,6 @@ async def show_keys(request):
 
 
 # ---- a job: settings, tables, problems
-
-
-def render_job(request, job, template, **values):
-    """Render a page of a job, with its navigation."""
-    desk = job.desk
-    tabs = [(name, desk.reader.title(name)) for name in (*desk.names, *desk.lists)]
-    addable = [(name, desk.reader.title(name)) for name in desk.addable]
-    common = {
-        "job": job,
-        "title": desk.draft.value("tank", "id") or job.source.stem,
-        "tabs": tabs,
-        "addable": addable,
-        "state": job.describe(),
-        "unsaved": desk.unsaved,
-        "steps": [] if desk.unsaved is None else list(map(desk.reader.step, desk.unsaved.edits)),
-        "locked": "" if desk.draft.locked is None else desk.reader.say(desk.draft.locked),
-        "unreadable": [desk.reader.line(problem) for problem in desk.draft.unreadable],
-    }
-    return render(request, template, **(common | values))
 
 
 async def show_settings(request):
@@ -471,7 +367,9 @@ async def send_grid(request):
     words = job.desk.reader.words["workbench"]["grid"] | job.desk.reader.words["app"]["grid"]
     content = {"name": name, "label": job.desk.reader.title(name), "words": words}
     content |= {"shows_units": True, "passes_keys": True}
-    return JSONResponse(content | describe_grid(job.desk, name) | describe_state(job.desk))
+    content |= describe_grid(job.desk, name) | describe_state(job.desk)
+    content["locked"] |= not person_of(request).may(EDIT)
+    return JSONResponse(content)
 
 
 def answer_changes(job, name, since, entered=()):
@@ -711,26 +609,27 @@ async def run(request):
     return redirect(request, f"/job/{job.key}/results")
 
 
+async def run_all(request):
+    """Compute all listed jobs that are ready or older than their data; two at a time."""
+    from tankcal.products.desk.states import State
+
+    site = request.app.state.site
+    jobs = await asyncio.to_thread(site.list_recent)
+    for key, item in jobs:
+        if item.state.state in (State.READY, State.STALE):
+            job = site.job(key, language_of(request))
+            with suppress(TankcalError):  # the page of the job shows its problems
+                await job.check()
+                job.start()
+    return redirect(request, "/")
+
+
 async def stop(request):
     """Stop the computation."""
     job = job_of(request)
     if job.run is not None:
         await job.run.stop()
     return redirect(request, f"/job/{job.key}/results")
-
-
-def list_results(job):
-    """Files of the results, {name: path}."""
-    with suppress(OSError):
-        return {path.name: path for path in sorted(job.desk.out.iterdir()) if path.is_file()}
-    return {}
-
-
-def read_paper(job, language):
-    """Record of a job as a report; slow, for a thread."""
-    from tankcal.report.paper import Paper
-
-    return Paper(job.desk.out / "record.json", language=language)
 
 
 async def show_results(request):
@@ -752,13 +651,6 @@ async def show_results(request):
         else str(state), blocking=desk.outcome.problems[:5],
         asked=[field.label for field in find_asked_fields(desk)], **values,
     )  # fmt: skip
-
-
-def find_asked_fields(desk):
-    """Fields of the certificate that ISO/IEC 17025 requires and that are blank."""
-    from tankcal.products.desk.forms import form_of
-
-    return [field for field in form_of(desk) if field.is_asked]
 
 
 def describe_results(job, language):
@@ -869,3 +761,45 @@ async def show_quantity(request):
         request, job, "quantity", tab="results", sections=sections, problems=problems,
         answer=Markup(answer), texts=dict(request.query_params),
     )  # fmt: skip
+
+
+async def show_what_if(request):
+    """Budget of a volume with a factor for each standard uncertainty."""
+    job, language = job_of(request), language_of(request)
+    if "record.json" not in list_results(job):
+        raise HTTPException(404)
+    query = request.query_params
+
+    def make():
+        from tankcal.products.desk import what_if
+
+        paper = read_paper(job, language)
+        known = what_if.list_recorded_budgets(paper)
+        numbers = [number for number, _ in known]
+        text = query.get("budget", "")
+        number = int(text) if text.isdecimal() and int(text) in numbers else None
+        if number is None and not numbers:
+            return {"budgets": [], "number": None, "lines": [], "sentences": [], "table": ""}
+        number = numbers[0] if number is None else number
+        changed = what_if.change_recorded_budget(paper, number, read_factors(query))
+        return {
+            "budgets": known, "number": number, "sentences": what_if.budget_sentences(
+                paper, changed), "table": Markup(what_if.table_html(paper, changed)),
+            "lines": [(name, factor, paper.number(factor, decimals=2))
+                      for name, factor in zip(changed.names, changed.factors, strict=True)],
+        }  # fmt: skip
+
+    values = await asyncio.to_thread(make)
+    return render_job(request, job, "what-if", tab="results", **values)
+
+
+def read_factors(query):
+    """Factors {index of a line: factor} of a query, within the range of the sliders."""
+    from tankcal.products.desk.what_if import LARGEST
+
+    factors = {}
+    for name, text in query.items():
+        with suppress(ValueError):
+            if name.startswith("f") and name[1:].isdecimal() and 0 <= float(text) <= LARGEST:
+                factors[int(name[1:])] = float(text)
+    return factors

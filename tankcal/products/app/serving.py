@@ -10,6 +10,7 @@ from pathlib import Path
 from tankcal.errors import InputError, Problem, reason_of
 from tankcal.messages import message
 from tankcal.products.app.guard import Guard, new_token
+from tankcal.products.app.people import People
 from tankcal.products.app.server import make_application
 from tankcal.products.app.site import Site
 from tankcal.products.desk.journal import find_state_folder
@@ -70,7 +71,7 @@ def guard_application(site, port, token, hosts, base="", is_secure=False):
     names = {name if ":" in name.strip("[]") else f"{name}:{port}" for name in hosts}
     names |= {f"{name}:{port}" for name in hosts} | ({*hosts} if is_secure else set())
     application = make_application(site, base)
-    return Guard(application, names, token, f"tankcal-{port}", is_secure)
+    return Guard(application, names, token, f"tankcal-{port}", is_secure, site.people, base)
 
 
 def write_state(folder, address):
@@ -114,7 +115,8 @@ def serve(bound, application, state_file, certificate=None, key=None):
         pass
     finally:
         with suppress(OSError):
-            state_file.unlink()
+            if state_file is not None:
+                state_file.unlink()
 
 
 def open_browser(address):
@@ -126,8 +128,10 @@ def open_browser(address):
 __all__ = [
     "HERE",
     "LOCAL_NAMES",
+    "People",
     "Site",
     "default_workspace",
+    "find_state_folder",
     "free_socket",
     "guard_application",
     "new_token",

@@ -9,16 +9,22 @@ import hashlib
 import secrets
 import time
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tankcal.errors import InputError
+from tankcal.messages import message
+from tankcal.products.app.people import ChangeLog
 from tankcal.products.app.runs import WorkerRun
+from tankcal.products.desk.computing import Refusal
 from tankcal.products.desk.desk import Desk
 from tankcal.products.desk.display import Reader
 from tankcal.products.desk.draft import Draft, source_of
 from tankcal.products.desk.jobs import RecentJobs
 from tankcal.products.desk.journal import Journal, find_state_folder
+from tankcal.products.desk.locks import RENEWAL_S, JobLock, new_owner
+from tankcal.products.desk.review import Act, find_decision, read_events, record_digest
+from tankcal.products.desk.states import State, state_of_results
 from tankcal.products.desk.windows import describe_state
 from tankcal.report.folders import default_folder
 from tankcal.text.words import load_words
@@ -27,6 +33,8 @@ SAVE_S = 2.0  # time after the last edit at which the files are written
 QUICK_CHECK_S = 0.08  # a full check that takes less time is made before the answer to an edit
 MOST_UPLOAD = 200_000_000  # bytes
 KEPT_UPLOAD_S = 24 * 3600
+UNUSED_S = 3600  # time without a request after which a job is closed
+REGISTER = "register.csv"  # in the workspace
 MOST_WAITING = 64  # events that wait for a window
 
 
@@ -44,10 +52,12 @@ class Upload:
 
 
 class OpenJob:
-    """A job with its desk, its computation, and the windows that show it."""
+    """A job with its desk, its lock, its computation, and the windows that show it."""
 
-    def __init__(self, key, desk):
-        self.key, self.desk = key, desk
+    def __init__(self, key, desk, lock):
+        self.key, self.desk, self.lock = key, desk, lock
+        self.holder, self.used_s = None, time.monotonic()
+        self._has_formulas, self._approval = desk.draft.locked, (None, None)
         self.run, self.is_autosaved = None, not desk.draft.is_book
         self.check_s, self.saved_s, self.refusal = 0.0, None, ""
         self._windows, self._tasks = set(), {}
@@ -61,6 +71,72 @@ class OpenJob:
     def is_computing(self):
         """Whether a computation has not ended."""
         return self.run is not None and self.run.is_active
+
+    @property
+    def is_watched(self):
+        """Whether a window shows the job."""
+        return bool(self._windows)
+
+    @property
+    def is_unsaved(self):
+        """Whether the draft differs from the files."""
+        return self.desk.draft.is_changed
+
+    @property
+    def out(self):
+        """Folder of the results."""
+        return self.desk.out
+
+    @property
+    def folder(self):
+        """Folder of the files of the job."""
+        return self.source.parent if self.source.is_file() else self.source
+
+    # ---- lock and approval
+
+    def follow_lock(self, *, by_force=False):
+        """Lock the draft while another program has the job open, or while it is approved."""
+        self.used_s = time.monotonic()
+        self.holder = self.lock.acquire(by_force=by_force)
+        self.desk.draft.locked = self._has_formulas or self.read_only
+
+    @property
+    def read_only(self):
+        """Message why the job must not be changed or computed; None if it may be."""
+        if self.holder is not None:
+            return message(
+                "job_open_elsewhere",
+                "open in another program ({user} on {machine}); it is only shown here until it is "
+                "closed there",
+                user=self.holder.user, machine=self.holder.machine,
+            )  # fmt: skip
+        approval = self._find_approval()
+        if approval is not None:
+            return message(
+                "job_approved", "approved by {name} on {day}; Revise on the page Review permits "
+                "changes", name=approval.name, day=f"{approval.time:%Y-%m-%d}",
+            )  # fmt: skip
+        return None
+
+    def _find_approval(self):
+        """Event of the approval of the present results, or None; kept while no file changes."""
+        from tankcal.products.desk.review import FILE, folder_of
+
+        path = folder_of(self.source) / FILE
+        try:
+            stamp = path.stat().st_mtime_ns, (self.out / "record.json").stat().st_mtime_ns
+        except OSError:
+            return None
+        if self._approval[0] != stamp:
+            decision = None
+            with suppress(InputError):
+                decision = find_decision(read_events(self.source), record_digest(self.out))
+            if decision is not None and decision.act is not Act.APPROVED:
+                decision = None
+            self._approval = stamp, decision
+        decision = self._approval[1]
+        is_present = decision and state_of_results(self.folder, self.out) is State.COMPUTED
+        return decision if is_present else None
 
     # ---- windows
 
@@ -152,6 +228,8 @@ class OpenJob:
         """Save the job and start its computation; raises Refusal if it cannot be computed."""
         if self.is_computing:
             return
+        if self.read_only is not None:
+            raise Refusal(self.desk.reader.say(self.read_only))
         prepared = self.desk.prepare_run()
         self.saved_s = time.time()
         self.run = WorkerRun(prepared.source, prepared.out, has_documents, self.publish)
@@ -168,6 +246,14 @@ class OpenJob:
         }
 
 
+def _add_certificate(job, certificates):
+    """`RecentJob` with the state of its certificate in the register, if there is any."""
+    known = certificates.get(job.state.record_sha256) if job.state.record_sha256 else None
+    if known is None:
+        return job
+    return replace(job, state=replace(job.state, state=State(known.state), number=known.number))
+
+
 class Site:
     """Jobs, uploads and folders of a running app.
 
@@ -177,12 +263,15 @@ class Site:
         Folder of new jobs.
     state : Path, optional
         State folder; by default that of the user.
+    people : People, optional
+        Users of an app that other machines can reach; None: the user of this machine.
     """
 
-    def __init__(self, workspace, state=None):
-        self.workspace = Path(workspace)
+    def __init__(self, workspace, state=None, people=None):
+        self.workspace, self.people = Path(workspace), people
+        self.owner, self._renewal = new_owner(), None
         self.state = Path(state or find_state_folder())
-        self.recent = RecentJobs(self.state)
+        self.recent, self.log = RecentJobs(self.state), ChangeLog(self.state)
         self._paths, self._jobs, self._uploads, self._readers = {}, {}, {}, {}
         self._places, self._words = {}, {}
         self._remove_old_uploads()
@@ -216,10 +305,24 @@ class Site:
         return key
 
     def list_recent(self):
-        """List of (identifier, RecentJob)."""
+        """List of (identifier, RecentJob); the register states which results are issued."""
         jobs = self.recent.list()
         self._paths |= {identifier(job.source): job.source for job in jobs}
-        return [(identifier(job.source), job) for job in jobs]
+        certificates = {}
+        with suppress(InputError):  # the page of the register shows the problem
+            certificates = {item.record_sha256: item for item in self.read_register().values()}
+        return [(identifier(job.source), _add_certificate(job, certificates)) for job in jobs]
+
+    @property
+    def register(self):
+        """Path of the register of certificates."""
+        return self.workspace / REGISTER
+
+    def read_register(self):
+        """Certificates of the register, {number: RegisteredCertificate}."""
+        from tankcal.products.register.certificates import read_certificates
+
+        return read_certificates(self.register) if self.register.is_file() else {}
 
     def path(self, key):
         """Path of a listed job, or None."""
@@ -244,9 +347,34 @@ class Site:
             except InputError:
                 return None
             desk.keep_journal(Journal(source, self.state))
-            job = self._jobs[key] = OpenJob(key, desk)
+            lock = JobLock(source, self.owner)
+            job = self._jobs[key] = OpenJob(key, desk, lock)
+            self._keep_locks()
+        job.follow_lock()
         job.desk.reader = self.reader(language)
         return job
+
+    def _keep_locks(self):
+        """Start to renew the locks, and to close unused jobs, while the server runs."""
+        if self._renewal is None or self._renewal.done():
+            with suppress(RuntimeError):  # without a running loop, as in a test of the model
+                self._renewal = asyncio.get_running_loop().create_task(self._renew_locks())
+
+    async def _renew_locks(self):
+        while self._jobs:
+            await asyncio.sleep(RENEWAL_S)
+            for key, job in list(self._jobs.items()):
+                is_unused = time.monotonic() - job.used_s > UNUSED_S
+                if is_unused and not (job.is_watched or job.is_computing or job.is_unsaved):
+                    job.lock.release()
+                    del self._jobs[key]
+                else:
+                    job.lock.renew()
+
+    def close(self):
+        """Release the locks at the end of the server."""
+        for job in self._jobs.values():
+            job.lock.release()
 
     def forget(self, key):
         """Read a job again when it is next shown, because its files were replaced."""
@@ -278,7 +406,8 @@ class Site:
         places : list of (str, str, bool)
             Identifier, name, and whether the folder or workbook is a job.
         """
-        roots = [self.workspace, Path.home()]
+        # Users of other machines get the workspace only.
+        roots = [self.workspace] if self.people else [self.workspace, Path.home()]
         if key == "":
             return None, [self._place(root, str(root)) for root in dict.fromkeys(roots)]
         path = self._places.get(key)

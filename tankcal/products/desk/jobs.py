@@ -14,12 +14,27 @@ from pathlib import Path
 from tankcal.job.starter.writing import refuse_other_survey, write_starter
 from tankcal.job.tables import SETTINGS_FILE
 from tankcal.products.desk.journal import find_state_folder
+from tankcal.products.desk.review import FILE as REVIEW
+from tankcal.products.desk.review import folder_of
 from tankcal.products.desk.states import JobState, State, state_of
+from tankcal.report.folders import default_folder
 
 RECENT_FILE = "recent.json"
 MOST_RECENT = 200
+JOB_FILES = SETTINGS_FILE, "job.xlsx"  # a job folder has either file
 NOT_COPIED = (
-    *("results", "*-results", "published", ".*", "*.ipynb", "*.py", "*.md", "__pycache__"),
+    *(
+        "results",
+        "*-results",
+        "review",
+        "*-review",
+        "published",
+        ".*",
+        "*.ipynb",
+        "*.py",
+        "*.md",
+        "__pycache__",
+    ),
 )
 MOST_LETTERS = 60  # longest name of a new folder
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)  # names of Windows devices
@@ -160,13 +175,12 @@ class RecentJobs:
 def _stamp(source):
     """Times and sizes of the files of a job and its record; None if the job is gone."""
     try:
-        files = [source] if source.is_file() else [*source.iterdir()]
-        if source.is_dir():
-            files += [source / "results" / "record.json"]
-            if not any(path.name in (SETTINGS_FILE, "job.xlsx") for path in files):
-                return None
-        else:
-            files += [source.with_name(f"{source.stem}-results") / "record.json"]
+        files = [source] if source.is_file() else [
+            path for path in source.iterdir() if not path.name.startswith(".")
+        ]  # fmt: skip
+        if source.is_dir() and not any(path.name in JOB_FILES for path in files):
+            return None
+        files += [default_folder(source) / "record.json", folder_of(source) / REVIEW]
         stats = [(path.name, path.stat()) for path in sorted(files) if path.is_file()]
     except OSError:
         return None

@@ -2,12 +2,14 @@
 
 import hashlib
 import json
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
 from tankcal.errors import InputError
 from tankcal.job.loading import load
+from tankcal.products.desk.review import find_decision, read_events, record_digest
 from tankcal.report.folders import default_folder
 
 RECORD = "record.json"
@@ -22,6 +24,13 @@ class State(StrEnum):
     READY = "ready"  # without problems and without results
     COMPUTED = "computed"  # the results belong to the files
     STALE = "stale"  # the files were changed after the computation
+    SUBMITTED = "submitted"  # in review
+    REVIEWED = "reviewed"  # to be approved
+    RETURNED = "returned"  # by the reviewer
+    APPROVED = "approved"
+    ISSUED = "issued"  # in the register, as the two that follow
+    REPLACED = "replaced"
+    WITHDRAWN = "withdrawn"
 
 
 @dataclass(frozen=True)
@@ -38,6 +47,12 @@ class JobState:
         Name and kind of the tank; "" if the settings do not state them.
     changed_s : float
         Time of the last change of a file, seconds since 1970.
+    person : str
+        Name of the person who decided on the results; "" without a decision.
+    record_sha256 : str
+        SHA-256 of results that belong to the files.
+    number : str
+        Number of the certificate in the register.
     """
 
     state: State
@@ -45,6 +60,9 @@ class JobState:
     tank: str = ""
     kind: str = ""
     changed_s: float = 0.0
+    person: str = ""
+    record_sha256: str = ""
+    number: str = ""
 
 
 def state_of(source, out=None):
@@ -74,6 +92,14 @@ def state_of(source, out=None):
     paths = [folder / name for name in draft.digests()]
     changed = max((path.stat().st_mtime for path in paths if path.is_file()), default=0.0)
     results = state_of_results(folder, out)
+    if results is State.COMPUTED:
+        digest, decision = record_digest(out), None
+        with suppress(InputError):  # the page of the review shows why it cannot be read
+            decision = find_decision(read_events(source), digest)
+        if decision is not None:
+            results, person = State(decision.act), decision.name
+            return JobState(results, 0, *named, changed, person, digest)
+        return JobState(results, 0, *named, changed, "", digest)
     if results is not None:
         return JobState(results, 0, *named, changed)
     try:

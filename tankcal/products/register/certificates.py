@@ -34,6 +34,7 @@ COLUMNS = (
     Field("record_sha256", "text", ""),
     Field("replaced_by", "text", ""),
     Field("reason", "text", ""),
+    Field("approved_by", "text", ""),
 )
 _HEADINGS = tuple(field.name for field in COLUMNS)
 
@@ -50,8 +51,8 @@ class RegisteredCertificate:
         Date of the state.
     record_sha256 : str
         SHA-256 of the record on which the certificate is based.
-    replaced_by, reason : str
-        "" if not replaced or without a reason.
+    replaced_by, reason, approved_by : str
+        "" if not replaced, without a reason, or without an approval in the app.
     """
 
     number: str
@@ -63,6 +64,7 @@ class RegisteredCertificate:
     since: str = ""
     replaced_by: str = ""
     reason: str = ""
+    approved_by: str = ""
 
 
 def read_certificates(path):
@@ -112,7 +114,7 @@ def _add_event(certificates, event, report):
             return
         certificates[number] = RegisteredCertificate(
             number, event["tank"], event["survey_date"], event["date"], event["record_sha256"],
-            since=event["date"],
+            since=event["date"], approved_by=event.get("approved_by", ""),
         )  # fmt: skip
     elif reason := _reason_against(known, event, certificates):
         report(reason)
@@ -172,7 +174,7 @@ def _reason_against(known, event, certificates):
     return None
 
 
-def issue(path, sources):
+def issue(path, sources, approved_by=""):
     """Register the certificates of results as issued, and those that they replace as replaced.
 
     Parameters
@@ -181,6 +183,8 @@ def issue(path, sources):
         Register; a new file is created.
     sources : sequence of path
         Folders of results, or record.json.
+    approved_by : str, optional
+        Name of the person who approved the results.
 
     Returns
     -------
@@ -198,6 +202,9 @@ def issue(path, sources):
         events += _events_of(file, problems)
     if problems:
         raise InputError(problems)
+    for event in events:
+        if event["event"] == ISSUED:
+            event["approved_by"] = approved_by
     return [
         certificate
         for certificate in _append(path, events)

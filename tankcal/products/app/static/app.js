@@ -292,16 +292,37 @@ for (const form of document.querySelectorAll("[data-new]")) {
   form.addEventListener("change", choose);
   choose();
 }
+function listenToSearch(page) {
+  const search = page.querySelector("[data-filter]");
+  search?.addEventListener("input", () => {
+    for (const row of $(search.dataset.filter).tBodies[0].rows) {
+      row.hidden = !row.textContent.toLowerCase().includes(search.value.toLowerCase());
+    }
+  });
+}
+function replaceContent(place, html, id) {
+  place.replaceChildren(...new DOMParser().parseFromString(html, "text/html").getElementById(id).childNodes);
+}
+listenToSearch(document);
+for (const form of document.querySelectorAll("[data-live]")) {
+  let asked = 0;
+  form.addEventListener("input", ({ target }) => {
+    const output = form.querySelector(`output[for="${target.id}"]`);
+    if (output) output.textContent = Number(target.value).toFixed(2).replace(".", output.dataset.mark);
+  });
+  form.addEventListener("change", async ({ target }) => {
+    if (target.type !== "range") return;
+    const number = ++asked;
+    try {
+      const html = await request(`?${new URLSearchParams(new FormData(form))}`);
+      if (number === asked) replaceContent($(form.dataset.live), html, form.dataset.live);
+    } catch (error) { tell(error.message); }
+  });
+}
 for (const place of document.querySelectorAll("[data-fragment]")) {
   request(place.dataset.fragment).then((html) => {
-    const page = new DOMParser().parseFromString(html, "text/html");
-    place.replaceChildren(...page.getElementById("main").childNodes);
-    const search = place.querySelector("[data-filter]");
-    search?.addEventListener("input", () => {
-      for (const row of $(search.dataset.filter).tBodies[0].rows) {
-        row.hidden = !row.textContent.toLowerCase().includes(search.value.toLowerCase());
-      }
-    });
+    replaceContent(place, html, "main");
+    listenToSearch(place);
   }).catch((error) => { place.textContent = error.message; });
 }
 if (job) {
