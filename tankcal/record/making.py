@@ -302,6 +302,27 @@ class JobAsRead(Saved):
     )
 
 
+class MeterByTank(Saved):
+    """Factor of a meter, as determined together with a table kept up by everyday data."""
+
+    name: str = key("of the meter")
+    certificate: str | None = key("null: not traceable")
+    factor: Finite = key("volume over indication, relative to its certificate")
+    u: Finite = key("standard uncertainty")
+    covariance_with_inputs: list[Finite] = key("of the factor with each input of the table")
+
+
+class KeptUp(Saved):
+    """Everyday data of a table (`tankcal upkeep`)."""
+
+    former_sha256: str = key("of the record of the former table, which the table contains")
+    first: str = key("day of the first step, UTC")
+    last: str = key("day of the last step, UTC")
+    steps: int = key("used")
+    logs: list[str] = key("SHA-256 of all logs in the table, also of earlier upkeeps")
+    meters: list[MeterByTank] = key("by the tank")
+
+
 def saved_parts_of_methods():
     """Keys of the methods in a record: {name: (dataclass, description)}."""
     parts = {method.name: (method.saved_type(), method.saved_note) for method in methods()}
@@ -376,6 +397,9 @@ class Record(Saved, kw_only=True):
     deliveries: list[WorstDeliveries] = key("the worst of each minimum height", default=())
     rule: table.TableJudged | None = key("null: the job has no decision rule", default=None)
     monte_carlo: table.MonteCarlo | None = key("null: it is off", default=None)
+    upkeep: KeptUp | None = key(
+        "everyday data of the table; left out without them", default=None, optional=True
+    )
     long_tables: LongTables | None = key(
         "the file of tables with more than 10 000 rows; left out if there are none",
         default=None,

@@ -17,6 +17,7 @@ import shutil
 import tempfile
 from contextlib import suppress
 from dataclasses import dataclass
+from importlib import import_module
 from operator import attrgetter
 from pathlib import Path, PurePosixPath
 
@@ -131,6 +132,10 @@ def compute_again(record, job, step=None, part=None, cluster="auto"):
     TankcalError
         If this version refuses the job, or finds no valid solution.
     """
+    if record.get("upkeep"):
+        # A product above this package computes such a record, so it is named by a text.
+        product = import_module("tankcal.products.upkeep.new_record")
+        return product.compute_record_again(record, job), None
     from tankcal.job import load
     from tankcal.pipeline.chain import adjust_job, run
 

@@ -145,12 +145,26 @@ def calibration(paper):
 
 
 def calibration_facts(paper):
-    """Labels and texts of the noise of the sections and the next verification, as far as known."""
+    """Labels and texts of everyday data, noise and next verification, as far as known."""
     facts = (
+        ("upkeep", upkeep_text(paper)),
         ("section_noise", homogeneity_text(paper)),
         ("next_verification", next_verification_text(paper)),
     )
     return [(key, text) for key, text in facts if text]
+
+
+def upkeep_text(paper):
+    """Return the period of the everyday data in the table, and its meters; None without data."""
+    upkeep = paper.record.get("upkeep")
+    if not upkeep:
+        return None
+    meters = [f"{meter['name']} ({meter['certificate']})" for meter in upkeep["meters"]
+              if meter["certificate"]]  # fmt: skip
+    return paper.word(
+        "certificate.upkeep", first=paper.day(upkeep["first"]), last=paper.day(upkeep["last"]),
+        steps=upkeep["steps"], digest=upkeep["former_sha256"][:12], meters=", ".join(meters),
+    )  # fmt: skip
 
 
 def homogeneity_text(paper):

@@ -31,6 +31,13 @@ _PARTS = (  # name of each PDF and the part of the notebook that it contains
 _PARTS_OF_SURVEY = (("working-papers.pdf", "working-papers"),)
 
 
+def is_certifiable(record):
+    """Whether a record may have a certificate: everyday data need a traceable meter."""
+    upkeep = record.get("upkeep")
+    has_meter = upkeep is None or any(meter["certificate"] for meter in upkeep["meters"])
+    return bool(record["capacity"]) and has_meter
+
+
 def build(record_path, directory, progress=None, language=None, letterhead=None, record=None):
     """Write the report files of a record into a folder and return their paths.
 
@@ -79,6 +86,8 @@ def build(record_path, directory, progress=None, language=None, letterhead=None,
         LETTERHEAD=letterhead and letterhead.save(directory),
     )
     parts = _PARTS if record["capacity"] else _PARTS_OF_SURVEY
+    if not is_certifiable(record):
+        parts = tuple(part for part in parts if part[1] != "certificate")
     return write_papers(notebook, directory, parts, progress, RECORD=ReadRecord(beside, record))
 
 

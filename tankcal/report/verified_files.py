@@ -161,14 +161,16 @@ def compare_certificate(verification, name, content, record):
             ),
         )
         return
-    files = {
-        text: reference
+    named = [
+        (text, reference)
         for data in root.iter(f"{_DCC}metaData")
         for text in [data.findtext(f"{_DCC}description/{_DCC}content")]
         for reference in [data.findtext(f"{_DCC}reference")]
         if reference
-    }
-    _same_record(verification, name, files.get(RECORD, ""))
+    ]
+    # The first record is that of the certificate; an input may be a record as well.
+    files = dict(named)
+    _same_record(verification, name, dict(reversed(named)).get(RECORD, ""))
     for entry in record["files"]:
         expected = f"sha256:{entry['sha256']}"
         if files.get(" ".join(entry["file"].split()), expected) != expected:

@@ -173,19 +173,151 @@ def test_late_clock(late_s):
 
 
 @pytest.fixture(scope="module")
-def station(tmp_path_factory):
-    """Folder of a station with the tank of the example of rings, 40 days."""
-    place = tmp_path_factory.mktemp("upkeep")
-    shutil.copytree(EXAMPLE.parent / "rings", place / "rings")
-    assert cli.main(["run", str(place / "rings"), "--no-papers", "--quiet"]) == 0
-    record = place / "rings" / "results" / "record.json"
+def record(tmp_path_factory):
+    """Record of the example of rings."""
+    place = tmp_path_factory.mktemp("former") / "rings"
+    shutil.copytree(EXAMPLE.parent / "rings", place)
+    assert cli.main(["run", str(place), "--no-papers", "--quiet"]) == 0
+    return place / "results" / "record.json"
+
+
+def make_station(folder, record, days, seed=7, **values):
+    """Folder of a station with the tank of a record, its logs divided into months."""
     former = read_table(record)
     tank = TrueTank()
     tank.grid, tank.volume = former.height_m, former.volume_m3
-    data = Station(days=40, tank=tank, period_s=300.0).run(np.random.default_rng(7))
-    write_station(place / "station", data)
-    shutil.copy(record, place / "station")
-    return place / "station"
+    data = Station(days=days, tank=tank, period_s=300.0, **values).run(np.random.default_rng(seed))
+    write_station(folder, data)
+    shutil.copy(record, folder)
+
+
+def divide_by_month(folder):
+    """Divide the logs of a folder into a file for each month; {month: names of its files}."""
+    settings, months = (folder / "upkeep.toml").read_text(), {}
+    for name in ("levels.csv", "meters.csv.log", "deliveries.csv"):
+        stem = name.partition(".")[0]
+        heading, *lines = (folder / name).read_text().splitlines()
+        (folder / name).unlink()
+        for line in lines:
+            file = folder / f"{stem}-{line[:7]}.csv"
+            if not file.exists():
+                file.write_text(f"{heading}\n")
+                months.setdefault(line[:7], []).append(file)
+            with file.open("a") as stream:
+                stream.write(f"{line}\n")
+        settings = settings.replace(name, f"{stem}-2*.csv")
+    (folder / "upkeep.toml").write_text(settings)
+    return months
+
+
+@pytest.mark.slow
+def test_months_with_state_equal_a_single_run(record, tmp_path, capsys, monkeypatch):
+    """A year by months, with kept state, a run that is stopped, and a damaged file."""
+    folder, state = tmp_path / "station", tmp_path / "state"
+    make_station(folder, record, 210)
+    months, later = divide_by_month(folder), tmp_path / "later"
+    later.mkdir()
+    for files in list(months.values())[-2:]:
+        for file in files:
+            file.rename(later / file.name)
+    run = ["upkeep", str(folder), "--json"]
+    with_state = [*run, "--state", str(state)]
+    assert cli.main(with_state) == 0
+    whole = sorted(state.iterdir())
+    whole[0].write_bytes(whole[0].read_bytes()[:100])  # damaged
+    first = capsys.readouterr().out
+    for file in later.iterdir():
+        file.rename(folder / file.name)
+    with monkeypatch.context() as patched:  # stopped before the search for causes
+        patched.setattr(
+            "tankcal.products.upkeep.watching._watch_window",
+            lambda *arguments: (_ for _ in ()).throw(KeyboardInterrupt),
+        )
+        assert cli.main(with_state) == 130
+    capsys.readouterr()
+    assert cli.main(with_state) == 0
+    by_months = capsys.readouterr().out
+    assert cli.main(run) == 0
+    assert by_months == capsys.readouterr().out != first
+    assert not [path for path in state.iterdir() if path.suffix != ".npz"]
+
+
+@pytest.fixture(scope="module")
+def improved(record, tmp_path_factory):
+    """Folder of a station whose levels move over half of the tank, and its new record."""
+    place = tmp_path_factory.mktemp("improved")
+    make_station(place / "station", record, 60, sales_a_day=120, low_m3=6.0, load_m3=24.0)
+    (place / "station" / "meters.csv").write_text(
+        "meter,factor,u_factor_ppm,certificate\n1,1,300,C-1\n2,1,300,C-2\n3,1,300,\n4,1,300,\n"
+    )
+    run = ["upkeep", str(place / "station"), "--record", str(place / "new"), "--quiet"]
+    assert cli.main(run) == 0
+    return place
+
+
+@pytest.mark.slow
+def test_new_record_is_a_record(record, improved, tmp_path, capsys):
+    """The new record has the new table, is verified bit by bit, and its papers can be made."""
+    new, former = read_table(improved / "new" / "record.json"), read_table(record)
+    out = tmp_path / "out"
+    assert cli.main(["upkeep", str(improved / "station"), "--out", str(out), "--quiet"]) == 0
+    saved = json.loads((out / "upkeep.json").read_text())
+    assert saved["mode"] == "improved"
+    assert_allclose(new.volume_m3, [row["volume_m3"] for row in saved["rows"]], rtol=1e-12)
+    u = np.linalg.norm(new.factor_m3, axis=1)
+    assert_allclose(saved["k"] * u, [row["U_m3"] for row in saved["rows"]], rtol=1e-9)
+    dips = np.array([0.5, 1.5])
+    spread = np.linalg.norm(np.diff(new.factor(dips), axis=0))
+    assert spread < 0.6 * np.linalg.norm(np.diff(former.factor(dips), axis=0))
+    assert abs(np.diff(new.volume(dips) - former.volume(dips))[0]) < 2 * spread
+    capsys.readouterr()
+    assert cli.main(["verify", str(improved / "new"), "--job", str(improved / "station")]) == 0
+    assert "identical bit for bit" in capsys.readouterr().out
+    content = json.loads((improved / "new" / "record.json").read_text())
+    assert [meter["certificate"] for meter in content["upkeep"]["meters"]] == ["C-1", "C-2", None,
+                                                                               None]  # fmt: skip
+    # Meter and table share the scale: the correlation is that of upkeep.json.
+    meter, stated = content["upkeep"]["meters"][0], saved["meters"][0]
+    ends = np.array([saved["period"]["lowest_m"], saved["period"]["highest_m"]])
+    between = np.diff(new.factor(ends), axis=0)[0]
+    correlation = between @ meter["covariance_with_inputs"] / np.linalg.norm(between) / meter["u"]
+    assert correlation == pytest.approx(stated["correlation"], abs=2e-3)
+
+
+@pytest.mark.slow
+def test_data_do_not_count_twice(improved, tmp_path, capsys):
+    """The logs of a table, or times within its data, are refused as data of its next upkeep."""
+    folder = tmp_path / "again"
+    shutil.copytree(improved / "station", folder)
+    shutil.copy(improved / "new" / "record.json", folder)
+    assert cli.main(["upkeep", str(folder), "--quiet"]) == 2
+    assert "levels.csv: the table in force contains this log" in capsys.readouterr().err
+    for name in ("levels.csv", "meters.csv.log", "deliveries.csv"):
+        path = folder / name
+        path.write_text(path.read_text() + "\n")
+    assert cli.main(["upkeep", str(folder), "--quiet"]) == 2
+    assert "2025-03-06; expected later data" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_no_certificate_without_a_traceable_meter(improved, tmp_path, capsys):
+    folder, new = tmp_path / "station", tmp_path / "new"
+    shutil.copytree(improved / "station", folder)
+    (folder / "meters.csv").unlink()
+    assert cli.main(["upkeep", str(folder), "--record", str(new), "--quiet"]) == 0
+    assert cli.main(["report", str(new), "--quiet"]) == 0
+    names = {path.name for path in new.iterdir()}
+    assert "working-papers.pdf" in names
+    assert not names & {"certificate.pdf", "certificate.xml"}
+    capsys.readouterr()
+
+
+@pytest.fixture(scope="module")
+def station(record, tmp_path_factory):
+    """Folder of a station with the tank of the example of rings, 40 days."""
+    place = tmp_path_factory.mktemp("upkeep") / "station"
+    make_station(place, record, 40)
+    return place
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose
 from tankcal.products.upkeep.filtering import (
     Drift,
     add_rows,
+    smooth_steps,
     start_triangle,
     total_innovations,
     whiten_steps,
@@ -115,7 +116,7 @@ def test_smoothed_marks_are_those_of_all_steps(case):
     used = drift.is_used
     covariance, states = written_out(drift)
     pull = np.linalg.solve(covariance[np.ix_(used, used)], data[used, 0])
-    smoothed = whiten_steps(drift, data[:, :1], is_smoothed=True).smoothed
+    smoothed = smooth_steps(drift, data[:, 0], whiten_steps(drift, data))
     for found, by_step in zip(smoothed.T, states, strict=True):
         assert_allclose(found, by_step[:, used] @ pull, atol=1e-12)
 

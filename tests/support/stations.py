@@ -67,6 +67,8 @@ class Station:
     fault_size: float = 0.0
     constant_c: float = 15.0
     expansion: float = 0.0
+    low_m3: float = 7.0  # stock at which a delivery is ordered
+    load_m3: float = 12.0
 
     def run(self, rng):
         """Tables: levels (s, m, degC), sales (begin s, end s, meter, L), tickets (s, L)."""
@@ -76,7 +78,8 @@ class Station:
             for hour in hours:
                 litres = np.clip(rng.gamma(3.0, 12.0), 4, 120)
                 sales.append((day * DAY_S + hour * HOUR_S, rng.choice(list(self.meters)), litres))
-        stock, time, free_at = 14.0, 0.0, {}
+        first = stock = self.low_m3 + 7.0
+        free_at = {}
         flows, tickets, sold = [], [], []
         for begin, meter, litres in sales:
             begin = max(begin, free_at.get(meter, 0.0))
@@ -89,8 +92,8 @@ class Station:
             flows.append((begin, end, -litres * factor / 1000))
             sold.append((begin, end, meter, litres))
             stock -= litres * factor / 1000
-            if stock < 7.0 and (not tickets or begin - tickets[-1][0] > 6 * HOUR_S):
-                volume = 12.0 + rng.choice([-1.0, 0.0, 1.0])
+            if stock < self.low_m3 and (not tickets or begin - tickets[-1][0] > 6 * HOUR_S):
+                volume = self.load_m3 + rng.choice([-1.0, 0.0, 1.0])
                 start = begin + 1800
                 bias = self.ticket
                 if after_fault and self.fault == "ticket":
@@ -101,7 +104,7 @@ class Station:
                 stock += volume
         time = np.arange(0, self.days * DAY_S, self.period_s)
         begin, end, volume = np.array(flows).T
-        inside = 14.0 + self._sum_flows(time, begin, end, volume)
+        inside = first + self._sum_flows(time, begin, end, volume)
         leak = np.full(len(time), self.leak_l_h)
         if self.fault == "leak":
             leak = leak + np.where(time / DAY_S > self.fault_day, self.fault_size, 0.0)

@@ -14,6 +14,7 @@ import numpy as np
 
 from tankcal.products.quantity.chain import table_shell_factor
 from tankcal.products.upkeep.filtering import Drift
+from tankcal.products.upkeep.state import hash_arrays
 from tankcal.tank.service import shell_factor
 
 YEAR_S = 365.25 * 86400
@@ -185,6 +186,14 @@ class Operation:
     air: tuple | None = None
     is_net: dict = field(default_factory=dict)
     start_ns: int | None = None
+
+    def fingerprint(self):
+        """Content that the estimates depend on: table, meters, priors and air."""
+        table = self.stock.table
+        return [table.digest, self.stock.names, self.stock.expansion_per_k, self.stock.base_c,
+                sorted(self.meters.items()), sorted(self.priors.items()),
+                sorted(self.is_net.items()), self.start_ns,
+                self.air and [hash_arrays(values) for values in self.air]]  # fmt: skip
 
     def linearize(self, steps, estimate=None, smoothed=None):
         """Linearise steps at estimates.

@@ -39,6 +39,18 @@ def add(commands):
         metavar="DIR",
         help="write report, upkeep.json, workbook and CSV files to this folder, all at once",
     )
+    upkeep.add_argument(
+        "--record",
+        metavar="DIR",
+        help="write record.json of the new table to this folder; `tankcal report DIR` writes its "
+        "reports, and a later upkeep begins with it",
+    )
+    upkeep.add_argument(
+        "--state",
+        metavar="DIR",
+        help="keep results of this run in this folder, so that the next month takes less time; "
+        "the output is equal without it",
+    )
     add_letterhead(upkeep)
     add_language(upkeep)
     upkeep.add_argument("--quiet", action="store_true", help="no progress, only problems")
@@ -56,6 +68,7 @@ def _upkeep(options):
         return
     from tankcal.products.upkeep.paper import DOCUMENT
     from tankcal.products.upkeep.reading import read_upkeep
+    from tankcal.products.upkeep.state import State
     from tankcal.products.upkeep.upkeep import keep_up
     from tankcal.record.schema import to_plain
 
@@ -64,12 +77,18 @@ def _upkeep(options):
         DOCUMENT.refuse_foreign(options.out)
     show = Progress(options.quiet or options.machine)
     show.step(message("upkeep_reading", "reading the logs"))
-    inputs = read_upkeep(options.folder)
+    state = State(options.state)
+    inputs = read_upkeep(options.folder, state)
     if options.language is None and inputs.sections["upkeep"]["language"] is not None:
         speak(inputs.sections["upkeep"]["language"])
     show.step(message("upkeep_estimating", "estimating the tank"))
-    upkeep = to_plain(keep_up(inputs))
-    written = ()
+    result = keep_up(inputs, state)
+    upkeep, written = to_plain(result), ()
+    if options.record is not None:
+        from tankcal.products.upkeep.new_record import make_record, write_record
+
+        record = make_record(inputs, result, state)
+        write_record(record, options.record, language_of_run())
     if options.out is not None:
         written = DOCUMENT.write(
             upkeep, Path(options.out), language_of_run(), show.step, letterhead

@@ -1,20 +1,29 @@
-"""Estimation of a tank in service from its steps, at adjusted levels, with rejected steps."""
+"""Estimation of a tank in service from its steps, at adjusted levels, with rejected steps.
+
+Steps are estimated in periods of half a period. A period starts with the triangle and the state of
+the filter of the period before, and its levels are adjusted by its own steps. The result therefore
+does not depend on when a period was computed, and a month costs at most the work of a period.
+"""
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import scipy.stats
 
 from tankcal.products.upkeep.causes import Balance
 from tankcal.products.upkeep.filtering import (
+    FilterState,
     Triangle,
-    Whitened,
     add_rows,
+    smooth_steps,
     start_triangle,
     total_innovations,
     whiten_steps,
 )
+from tankcal.products.upkeep.state import NO_STATE
 
+PERIOD_NS = 182 * 86400 * 10**9
 PASSES = 8  # largest number of linearisations
 SETTLED = 0.02  # largest change of a level in the last pass, in its standard deviations
 OUTLIER = 4.0  # |w| of a rejected step
@@ -32,25 +41,32 @@ class Estimation:
     steps : steps.Steps
     balance : Balance
         Linearised at the adjusted levels.
-    whitened : Whitened
-    triangle : Triangle
+    rows : ndarray, shape (n, 1 + c)
+        L^-1 (y, C).
     innovations : ndarray, shape (n,)
         Of the complete model, in order of time; 0 for steps without use.
+    triangle : Triangle
+    end : FilterState
+        At the last mark.
     rejected : ndarray of int
         Steps rejected as outliers.
     passes : int
     is_fitting : bool
-        False: more steps than `MOST_REJECTED` are outliers; no step was rejected.
+        False: more steps of a period than `MOST_REJECTED` are outliers; none of them was rejected.
+    periods : tuple of (int, int, str)
+        First and last step of each period, and the key of its saved state.
     """
 
     steps: object
     balance: Balance
-    whitened: Whitened
-    triangle: Triangle
+    rows: np.ndarray
     innovations: np.ndarray
+    triangle: Triangle
+    end: FilterState
     rejected: np.ndarray
     passes: int
     is_fitting: bool = True
+    periods: tuple = ()
 
     @property
     def is_used(self):
@@ -75,7 +91,7 @@ class Estimation:
         return causes.mean + causes.sd * self.triangle.estimate, causes.sd * sd_left
 
 
-def estimate(operation, steps, *, is_robust=True):
+def estimate(operation, steps, *, is_robust=True, state=NO_STATE):
     """Estimate all causes from steps.
 
     Levels and temperatures of the marks are unknowns. Each pass evaluates the stock and all columns
@@ -88,42 +104,102 @@ def estimate(operation, steps, *, is_robust=True):
     steps : steps.Steps
     is_robust : bool, default True
         Reject outliers, the largest first.
+    state : state.State, optional
+        Results of earlier runs; they are used for periods with equal steps.
 
     Returns
     -------
     Estimation
     """
+    age = steps.marks.time_ns[:-1] - steps.marks.time_ns[0]
+    edges = np.searchsorted(age // PERIOD_NS, np.arange(age[-1] // PERIOD_NS + 2))
+    periods, before, chain = [], None, repr(operation.fingerprint())
+    for first, last in pairwise(np.unique(edges).tolist()):
+        part = steps.part(first, last)
+        chain = state.key(chain, part, is_robust)
+        period = state.load(chain, Estimation, steps=part)
+        if period is None:
+            period = _estimate_period(operation, part, before, is_robust)
+            state.save(chain, period)
+        periods.append((first, last, chain, period))
+        before = period
+    return _join(steps, periods)
+
+
+def _join(steps, periods):
+    """`Estimation` of all periods."""
+    whole = [period for *_, period in periods]
+    balances, drifts = (
+        [period.balance for period in whole],
+        [period.balance.drift for period in whole],
+    )
+
+    def at_steps(parts, name):
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    def at_marks(parts, name):
+        """Values at marks: the last mark of a period is the first mark of the next period."""
+        return np.concatenate([getattr(part, name)[:-1] for part in parts[:-1]]
+                              + [getattr(parts[-1], name)])  # fmt: skip
+
+    last = whole[-1]
+    drift = replace(
+        last.balance.drift,
+        **{name: at_steps(drifts, name) for name in last.balance.drift.AT_STEPS},
+        **{name: at_marks(drifts, name) for name in last.balance.drift.AT_MARKS},
+    )
+    balance = replace(
+        last.balance, misclosure_m3=at_steps(balances, "misclosure_m3"),
+        columns_m3=at_steps(balances, "columns_m3"), level_m=at_marks(balances, "level_m"),
+        drift=drift,
+    )  # fmt: skip
+    return Estimation(
+        steps, balance, at_steps(whole, "rows"), at_steps(whole, "innovations"), last.triangle,
+        last.end, np.concatenate([first + period.rejected for first, _, _, period in periods]),
+        max(period.passes for period in whole), all(period.is_fitting for period in whole),
+        tuple(entry[:3] for entry in periods),
+    )  # fmt: skip
+
+
+def _estimate_period(operation, steps, before, is_robust):
+    """`Estimation` of the steps of a period, after that of the period `before` or None."""
     rejected, balance, triangle, smoothed = [], None, None, None
     passes = 0
     while passes < PASSES:
         passes += 1
-        before = None if balance is None else balance.level_m
+        earlier = None if balance is None else balance.level_m
         estimates = None if triangle is None else triangle.estimate
+        if estimates is None and before is not None:
+            estimates = before.triangle.estimate
         balance = operation.linearize(steps, estimates, smoothed)
         balance = _exclude_steps(balance, rejected)
-        whitened, triangle = _solve(balance)
+        whitened, triangle = _solve(balance, before)
         if is_robust:
-            robust = _reject(balance, whitened, triangle, rejected)
+            robust = _reject(balance, whitened, triangle, rejected, before)
             if robust[3] is None:
                 # The model does not fit: all steps are used, so that a fault shows in the watching.
-                return replace(estimate(operation, steps, is_robust=False), is_fitting=False)
+                period = _estimate_period(operation, steps, before, is_robust=False)
+                return replace(period, is_fitting=False)
             balance, whitened, triangle, rejected = robust
-        residual = balance.misclosure_m3 - balance.columns_m3 @ triangle.estimate
-        smoothed = whiten_steps(balance.drift, residual[:, None], is_smoothed=True).smoothed
-        if before is not None:
-            change = np.abs(balance.level_m - before) / balance.drift.level_sd_m
+        effects = np.append(1.0, -triangle.estimate)
+        residuals = balance.misclosure_m3 - balance.columns_m3 @ triangle.estimate
+        start = None if before is None else before.end.mean @ effects
+        smoothed = smooth_steps(balance.drift, residuals, whitened, start)
+        if earlier is not None:
+            change = np.abs(balance.level_m - earlier) / balance.drift.level_sd_m
             if np.max(change, initial=0.0) < SETTLED:
                 break
-    innovations = total_innovations(whitened.rows, balance.drift.is_used)[:, 0]
-    return Estimation(steps, balance, whitened, triangle, innovations,
+    upper = None if before is None else before.triangle.upper
+    innovations = total_innovations(whitened.rows, balance.drift.is_used, upper=upper)[:, 0]
+    return Estimation(steps, balance, whitened.rows, innovations, triangle, whitened.end,
                       np.array(sorted(rejected), dtype=int), passes)  # fmt: skip
 
 
-def _solve(balance):
-    """(`Whitened`, `Triangle`) of linearised steps."""
+def _solve(balance, before):
+    """(`Whitened`, `Triangle`) of linearised steps, after those of the period before."""
     data = np.column_stack([balance.misclosure_m3, balance.columns_m3])
-    whitened = whiten_steps(balance.drift, data)
-    start = start_triangle(balance.columns_m3.shape[1])
+    whitened = whiten_steps(balance.drift, data, before and before.end)
+    start = before.triangle if before else start_triangle(balance.columns_m3.shape[1])
     return whitened, add_rows(start, whitened.rows, balance.drift.is_used)
 
 
@@ -136,7 +212,7 @@ def _exclude_steps(balance, rejected):
     return replace(balance, drift=replace(balance.drift, is_used=is_used))
 
 
-def _reject(balance, whitened, triangle, rejected):
+def _reject(balance, whitened, triangle, rejected, before):
     """Reject the steps with |w| above the limit, the largest first; None with too many of them."""
     most = int(MOST_REJECTED * balance.drift.is_used.sum()) + 1
     while True:
@@ -157,4 +233,4 @@ def _reject(balance, whitened, triangle, rejected):
         if len(rejected) > most:
             return balance, whitened, triangle, None
         balance = _exclude_steps(balance, rejected)
-        whitened, triangle = _solve(balance)
+        whitened, triangle = _solve(balance, before)

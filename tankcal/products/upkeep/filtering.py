@@ -23,6 +23,7 @@ The tests compare all of it with least squares and the covariance written out.
 """
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 import scipy.linalg
@@ -69,6 +70,8 @@ class Drift:
     wander_s: float
     layer_s: float
     walk_per_s: np.ndarray
+    AT_STEPS: ClassVar = ("seconds", "metered_m3", "layer_sd_k", "noise_m3", "is_used")
+    AT_MARKS: ClassVar = ("area_m2", "by_degree_m3", "level_sd_m")
 
     def __len__(self):
         """Number of steps."""
@@ -76,12 +79,10 @@ class Drift:
 
     def part(self, first, last):
         """Drift of the steps first to last - 1."""
-        at_steps = ("seconds", "metered_m3", "layer_sd_k", "noise_m3", "is_used")
-        at_marks = ("area_m2", "by_degree_m3", "level_sd_m")
         return replace(
             self,
-            **{name: getattr(self, name)[first:last] for name in at_steps},
-            **{name: getattr(self, name)[first : last + 1] for name in at_marks},
+            **{name: getattr(self, name)[first:last] for name in self.AT_STEPS},
+            **{name: getattr(self, name)[first : last + 1] for name in self.AT_MARKS},
         )
 
 
@@ -109,13 +110,12 @@ class Whitened:
     rows : ndarray, shape (n, 1 + c)
         L^-1 (y, C); 0 for steps without use.
     end : FilterState
-    smoothed : ndarray or None, shape (m, 3)
-        (e, w, l) at the marks by all steps; for a run over y alone.
+    gains : Gains
     """
 
     rows: np.ndarray
     end: FilterState
-    smoothed: np.ndarray | None = None
+    gains: object
 
 
 def start_state(drift, columns):
@@ -125,7 +125,7 @@ def start_state(drift, columns):
     return FilterState(np.zeros((MARK + meters, 1 + columns)), np.diag(variances))
 
 
-def whiten_steps(drift, data, state=None, *, is_smoothed=False):
+def whiten_steps(drift, data, state=None):
     """Run the filter over steps.
 
     Parameters
@@ -135,79 +135,133 @@ def whiten_steps(drift, data, state=None, *, is_smoothed=False):
         Misclosures y, then the columns C.
     state : FilterState, optional
         State at the first mark; None: no earlier steps.
-    is_smoothed : bool, default False
-        True: data are y alone, and the states at every mark are estimated from all steps.
 
     Returns
     -------
     Whitened
     """
     state = state or start_state(drift, data.shape[1] - 1)
-    meters = drift.metered_m3.shape[1]
-    size = 2 * MARK + meters
+    gains = _find_gains(drift, state.covariance)
+    rows, mean, _ = _run_means(drift, gains, data, state.mean)
+    return Whitened(rows, FilterState(mean, gains.end), gains)
+
+
+def smooth_steps(drift, residuals, whitened, start=None):
+    """Errors of the levels, wander and layers at every mark, by all steps.
+
+    Parameters
+    ----------
+    drift : Drift
+    residuals : ndarray, shape (n,)
+        Misclosures less the effects of the constant causes.
+    whitened : Whitened
+        Run of the filter over these steps.
+    start : ndarray, shape (states,), optional
+        State at the first mark by the residuals of earlier steps; None: 0.
+
+    Returns
+    -------
+    ndarray, shape (m, 3)
+    """
+    gains = whitened.gains
+    mean = np.zeros(len(gains.end)) if start is None else start
+    rows, _, predicted = _run_means(drift, gains, residuals[:, None], mean[:, None], is_kept=True)
+    smoothed = np.zeros((len(drift) + 1, MARK))
+    pull = np.zeros(MARK + len(gains.end))  # derivative of the log likelihood of the later steps
+    # Backward recursion of Bryson and Frazier.
+    for k in range(len(drift) - 1, -1, -1):
+        if drift.is_used[k]:
+            innovation = rows[k, 0] / gains.sd_m3[k]
+            pull = pull + gains.effect[k] * (innovation - gains.gain[k] @ pull)
+        state = predicted[k] + gains.covariance[k] @ pull
+        smoothed[k] = state[:MARK]
+        if k == len(drift) - 1:
+            smoothed[k + 1] = state[MARK : 2 * MARK]
+        pull = np.concatenate([np.zeros(MARK), gains.transition[k].T @ pull])
+    return smoothed
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Covariances of the filter, which do not depend on the misclosures.
+
+    The states of a step are those of its first mark, those of its second mark, and the factors.
+
+    Attributes
+    ----------
+    effect : ndarray, shape (n, size)
+        Effect of the states on the misclosure.
+    transition : ndarray, shape (n, size, states)
+        From the states at the first mark to those of the step.
+    covariance : ndarray, shape (n, size, size)
+        Before the misclosure of the step.
+    gain : ndarray, shape (n, size)
+        0: the step is not used.
+    sd_m3 : ndarray, shape (n,)
+        Standard deviation of the innovation.
+    end : ndarray, shape (states, states)
+        Covariance at the last mark.
+    """
+
+    effect: np.ndarray
+    transition: np.ndarray
+    covariance: np.ndarray
+    gain: np.ndarray
+    sd_m3: np.ndarray
+    end: np.ndarray
+
+
+def _find_gains(drift, end):
+    """`Gains` of the filter from the covariance of the states at the first mark."""
+    count, states = len(drift), len(end)
+    size = MARK + states
     stay, decay = (np.exp(-drift.seconds / scale) for scale in (drift.wander_s, drift.layer_s))
-    walk = np.outer(drift.seconds, drift.walk_per_s)
-    # States of a step: those of its first mark, those of its second mark, the factors.
-    effect = np.zeros((len(drift), size))
+    effect, transition = np.zeros((count, size)), np.zeros((count, size, states))
     area, warm = drift.area_m2, drift.by_degree_m3
     effect[:, 0] = effect[:, 1] = area[:-1]
     effect[:, 3] = effect[:, 4] = -area[1:]
     effect[:, 2], effect[:, 5] = -warm[:-1], warm[1:]
     effect[:, 6:] = drift.metered_m3
-    added = np.zeros((len(drift), size))
+    transition[:, range(MARK), range(MARK)] = 1.0
+    transition[:, range(2 * MARK, size), range(MARK, states)] = 1.0
+    # The error of a level is new at each mark; wander and layers decay.
+    transition[:, 4, 1], transition[:, 5, 2] = stay, decay
+    added = np.zeros((count, size))
     added[:, 3] = drift.level_sd_m[1:] ** 2
     added[:, 4] = drift.wander_sd_m**2 * (1 - stay**2)
     added[:, 5] = drift.layer_sd_k**2
-    added[:, 6:] = walk
-    mean, covariance = state.mean, state.covariance
-    rows, kept = np.zeros_like(data, dtype=float), []
-    # Rows of the state that become those of the next step: at the first mark, at the second.
-    source = np.array([0, 1, 2, 0, 1, 2, *range(MARK, MARK + meters)])
-    factors = np.ones((len(drift), size))
-    factors[:, 3], factors[:, 4], factors[:, 5] = 0.0, stay, decay
-    end = np.array([3, 4, 5, *range(6, size)])
-    diagonal = np.arange(size)
+    added[:, 6:] = np.outer(drift.seconds, drift.walk_per_s)
+    noise, is_used = drift.noise_m3**2, drift.is_used.tolist()
+    covariance, gain = np.zeros((count, size, size)), np.zeros((count, size))
+    variance, diagonal = np.ones(count), np.arange(size)
+    for k in range(count):
+        now = covariance[k]
+        np.matmul(transition[k] @ end, transition[k].T, out=now)
+        now[diagonal, diagonal] += added[k]
+        if not is_used[k]:
+            end = now[MARK:, MARK:]
+            continue
+        spread = now @ effect[k]
+        variance[k] = effect[k] @ spread + noise[k]
+        gain[k] = spread / variance[k]
+        end = now[MARK:, MARK:] - gain[k, MARK:, None] * spread[MARK:]
+    return Gains(effect, transition, covariance, gain, np.sqrt(variance), end)
+
+
+def _run_means(drift, gains, data, mean, *, is_kept=False):
+    """(innovations (n, 1 + c), means at the end, predicted means (n, size) of the first column)."""
+    rows, predicted = np.zeros_like(data, dtype=float), np.zeros_like(gains.gain)
+    is_used = drift.is_used.tolist()
     for k in range(len(drift)):
-        mean = factors[k][:, None] * mean[source]
-        covariance = np.outer(factors[k], factors[k]) * covariance[np.ix_(source, source)]
-        covariance[diagonal, diagonal] += added[k]
-        gain = variance = None
-        if is_smoothed:
-            predicted = mean[:, 0].copy(), covariance.copy()
-        if drift.is_used[k]:
-            spread = covariance @ effect[k]
-            variance = effect[k] @ spread + drift.noise_m3[k] ** 2
-            gain = spread / variance
-            innovation = data[k] - effect[k] @ mean
-            mean = mean + np.outer(gain, innovation)
-            covariance = covariance - np.outer(gain, spread)
-            rows[k] = innovation / np.sqrt(variance)
-        if is_smoothed:
-            kept.append((*predicted, gain, variance))
-        mean, covariance = mean[end], covariance[np.ix_(end, end)]
-    result = Whitened(rows, FilterState(mean, covariance))
-    if not is_smoothed:
-        return result
-    return replace(result, smoothed=_smooth(kept, effect, factors, rows[:, 0]))
-
-
-def _smooth(kept, effect, factors, innovations):
-    """States (m, 3) at the marks by all steps, by the backward recursion of Bryson and Frazier."""
-    smoothed = np.zeros((len(kept) + 1, MARK))
-    pull = np.zeros(effect.shape[1])  # derivative of the log likelihood of the later steps
-    for k in range(len(kept) - 1, -1, -1):
-        mean, covariance, gain, variance = kept[k]
-        if gain is not None:
-            pull = pull + effect[k] * (innovations[k] / np.sqrt(variance) - gain @ pull)
-        state = mean + covariance @ pull
-        smoothed[k] = state[:MARK]
-        if k == len(kept) - 1:
-            smoothed[k + 1] = state[MARK : 2 * MARK]
-        # Back through the transition: each new state came from its source with its factor.
-        by_factor = factors[k] * pull
-        back = by_factor[:MARK] + by_factor[MARK : 2 * MARK]
-        pull = np.concatenate([np.zeros(MARK), back, by_factor[2 * MARK :]])
-    return smoothed
+        mean = gains.transition[k] @ mean
+        if is_kept:
+            predicted[k] = mean[:, 0]
+        if is_used[k]:
+            rows[k] = data[k] - gains.effect[k] @ mean
+            mean = mean[MARK:] + gains.gain[k, MARK:, None] * rows[k]
+        else:
+            mean = mean[MARK:]
+    return rows / gains.sd_m3[:, None], mean, predicted
 
 
 @dataclass(frozen=True)
@@ -266,7 +320,7 @@ def add_rows(triangle, rows, is_used):
     return Triangle(upper, triangle.count + int(is_used.sum()))
 
 
-def total_innovations(rows, is_used, others=None, block=100):
+def total_innovations(rows, is_used, others=None, block=100, upper=None):
     """Innovations of the complete model, in order of time, from priors only.
 
     Parameters
@@ -278,6 +332,8 @@ def total_innovations(rows, is_used, others=None, block=100):
         L^-1 of the columns of further causes, whose innovations are returned after those of y.
     block : int
         Steps taken together; the result does not depend on it.
+    upper : ndarray, shape (c + 1, c + 1), optional
+        `Triangle.upper` of earlier steps, in which the further causes had no effect.
 
     Returns
     -------
@@ -287,7 +343,11 @@ def total_innovations(rows, is_used, others=None, block=100):
     right = rows[:, :1] if others is None else np.hstack([rows[:, :1], others])
     innovations, places = np.zeros_like(right), np.flatnonzero(is_used)
     size = rows.shape[1] - 1
-    upper, sums = np.eye(size), np.zeros((size, right.shape[1]))
+    sums = np.zeros((size, right.shape[1]))
+    if upper is None:
+        upper = np.eye(size)
+    else:
+        sums[:, 0], upper = upper[:-1, -1], upper[:-1, :-1]
     for start in range(0, len(places), block):
         steps = places[start : start + block]
         columns, now = rows[steps, 1:], right[steps]

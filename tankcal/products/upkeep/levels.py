@@ -1,10 +1,12 @@
 """Levels in the quiet windows of a tank: means of pieces, accumulated while the logs are read."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tankcal.products.upkeep.clocks import NOT_A_TIME, find_offset_s
+from tankcal.products.upkeep.logs import Findings
+from tankcal.products.upkeep.state import NO_STATE
 
 PIECE_NS = 3600 * 10**9  # longest piece of a quiet window
 STUCK_STEPS = 8  # movement of the level, in quanta, that a stuck float has missed
@@ -62,6 +64,47 @@ def divide_windows(windows):
     return np.stack([starts, starts + size], axis=1), window
 
 
+SUMS = ("n", "h", "hh", "t", "T", "nT", "w", "nw")  # see `LevelSums._add`
+
+
+@dataclass(frozen=True)
+class FileSpan:
+    """First and last time of a level log, nanoseconds UTC."""
+
+    first_ns: int
+    last_ns: int
+
+
+@dataclass(frozen=True)
+class FileSums:
+    """Sums of the readings of a file.
+
+    Attributes
+    ----------
+    first : int
+        Number of the first piece.
+    reference_m : ndarray, shape (p,)
+        Level from which the sums of each piece are taken; nan: no reading.
+    sums : ndarray, shape (8, p)
+        In the order of `SUMS`.
+    stuck_ns : ndarray of int64, shape (s, 2)
+    offsets : ndarray, shape (o, 2)
+        Times, and offsets of the clock in seconds.
+    names : tuple of str
+        Kinds of findings.
+    counts : ndarray of int64, shape (f, 3)
+        Number, first and last time of each kind.
+    """
+
+    first: int
+    reference_m: np.ndarray
+    sums: np.ndarray
+    stuck_ns: np.ndarray
+    offsets: np.ndarray
+    names: tuple
+    counts: np.ndarray
+
+
 class LevelSums:
     """Sums of the readings of each piece of the quiet windows.
 
@@ -84,41 +127,110 @@ class LevelSums:
     def __init__(self, windows, quantum_m, flows, volume_m3):
         self.pieces, self.window = divide_windows(windows)
         self.quantum_m, self.flows, self.volume_m3 = quantum_m, flows, volume_m3
-        self.offsets = []
         count = len(self.pieces)
-        self._reference = np.full(count, np.nan)
-        self._sums = {name: np.zeros(count) for name in ("n", "h", "hh", "t", "T", "nT", "w", "nw")}
-        self._stuck = []
+        self._total = np.full(count, np.nan), np.zeros((len(SUMS), count))
+        self.offsets, self._all_stuck = [], []
 
-    def read(self, files):
-        """Add the rows of level logs, in order of their first time."""
+    def read(self, files, state=NO_STATE):
+        """Add the rows of level logs, in order of their first time.
+
+        Sums of files that earlier runs have read are taken from `state`, if the windows and the
+        flows during the file are equal.
+        """
         for file in files:
-            recent = [np.zeros(0, dtype=np.int64), np.zeros(0)]
-            run, last = None, NOT_A_TIME
-            for chunk in file.chunks():
-                chunk = _separate_tags(chunk, file.profile)
-                if not len(chunk["time"]):
-                    continue
-                time, level = chunk["time"], chunk["level"]
-                late = time < np.maximum.accumulate(np.append(last, time))[:-1]
-                file.findings.add("levels", "late", time[late])
-                last = max(last, int(time.max(initial=NOT_A_TIME)))
-                file.findings.add("levels", "row", time)
-                order = np.argsort(time, kind="stable")
-                chunk = {key: values[order] for key, values in chunk.items()}
-                time, level = chunk["time"], chunk["level"]
-                is_level = np.isfinite(level)
-                is_new = self._find_new_rows(time, level, is_level, recent, file)
-                recent = [np.append(old, new)[-OVERLAP:] for old, new in
-                          zip(recent, (time[is_level & is_new], level[is_level & is_new]),
-                              strict=True)]  # fmt: skip
-                run = self._follow_runs(time[is_level], level[is_level], run)
-                self._compare_clocks(time[is_level], level[is_level], file)
-                is_line = np.zeros(len(time), dtype=bool)
-                is_line[is_level] = find_lines(time[is_level], level[is_level])
-                file.findings.add("levels", "interpolated", time[is_line])
-                self._add(chunk, is_new & ~is_line)
-            self._follow_runs(None, None, run)
+            key = state.key(file.digest, repr(file.profile), file.zone)
+            span, sums = state.load(key, FileSpan), None
+            if span is not None:
+                within = self._key(state, key, span)
+                sums = state.load(within, FileSums)
+            if sums is None:
+                span, sums = self._read_file(file)
+                if span is not None and not file.log.problems:
+                    state.save(key, span)
+                    state.save(self._key(state, key, span), sums)
+            self._add_file(sums, file.findings)
+
+    def _key(self, state, key, span):
+        """Key of the sums of a file: windows, flows and table during the file."""
+        if state.folder is None:
+            return ""
+        low, high = span.first_ns, span.last_ns
+        first, last = self._find_pieces(low, high)
+        flows = []
+        for flow in self.flows:
+            begin = max(np.searchsorted(flow.time_ns, low) - 1, 0)
+            part = slice(begin, np.searchsorted(flow.time_ns, high) + 2)
+            # Differences to rounding, so that earlier sums do not matter.
+            volumes = np.round(np.diff(flow.total_m3)[part], 9)
+            flows += [flow.name, flow.time_ns[part], flow.begin_ns[part], volumes]
+        grid = self.volume_m3(np.linspace(0.0, 30.0, 31))
+        return state.key(key, self.quantum_m, self.pieces[first:last], first, grid, *flows)
+
+    def _find_pieces(self, low, high):
+        """First and last piece of an interval, with a margin."""
+        first, last = np.searchsorted(self.pieces[:, 0], (low, high))
+        return max(int(first) - 1, 0), min(int(last) + 1, len(self.pieces))
+
+    def _add_file(self, sums, findings):
+        """Add the sums of a file, about the reference of the first file with a reading."""
+        place = slice(sums.first, sums.first + len(sums.reference_m))
+        reference, total = self._total[0][place], self._total[1][:, place]
+        reference[...] = np.where(np.isnan(reference), sums.reference_m, reference)
+        shift = np.nan_to_num(sums.reference_m - reference)
+        part = dict(zip(SUMS, sums.sums, strict=True))
+        part["hh"] = part["hh"] + 2 * shift * part["h"] + part["n"] * shift**2
+        part["h"] = part["h"] + part["n"] * shift
+        total += np.stack(list(part.values()))
+        self._all_stuck += [tuple(map(int, pair)) for pair in sums.stuck_ns]
+        self.offsets += [(int(time), offset) for time, offset in sums.offsets]
+        for name, (count, low, high) in zip(sums.names, sums.counts.tolist(), strict=True):
+            findings.add("levels", name, (low, high), count)
+
+    def _read_file(self, file):
+        """(`FileSpan` or None, `FileSums`) of a level log."""
+        count, file = len(self.pieces), replace(file, findings=Findings())
+        self._reference = np.full(count, np.nan)
+        self._sums = {name: np.zeros(count) for name in SUMS}
+        self._stuck, self._clocks = [], []
+        recent = [np.zeros(0, dtype=np.int64), np.zeros(0)]
+        run, first, last = None, None, NOT_A_TIME
+        for chunk in file.chunks():
+            chunk = _separate_tags(chunk, file.profile)
+            if not len(chunk["time"]):
+                continue
+            time, level = chunk["time"], chunk["level"]
+            late = time < np.maximum.accumulate(np.append(last, time))[:-1]
+            file.findings.add("levels", "late", time[late])
+            first = int(time.min()) if first is None else min(first, int(time.min()))
+            last = max(last, int(time.max(initial=NOT_A_TIME)))
+            file.findings.add("levels", "row", time)
+            order = np.argsort(time, kind="stable")
+            chunk = {key: values[order] for key, values in chunk.items()}
+            time, level = chunk["time"], chunk["level"]
+            is_level = np.isfinite(level)
+            is_new = self._find_new_rows(time, level, is_level, recent, file)
+            recent = [np.append(old, new)[-OVERLAP:] for old, new in
+                      zip(recent, (time[is_level & is_new], level[is_level & is_new]),
+                          strict=True)]  # fmt: skip
+            run = self._follow_runs(time[is_level], level[is_level], run)
+            self._compare_clocks(time[is_level], level[is_level], file)
+            is_line = np.zeros(len(time), dtype=bool)
+            is_line[is_level] = find_lines(time[is_level], level[is_level])
+            file.findings.add("levels", "interpolated", time[is_line])
+            self._add(chunk, is_new & ~is_line)
+        self._follow_runs(None, None, run)
+        low, high = (0, 0) if first is None else self._find_pieces(first, last)
+        counts = {name: entry for (_, name), entry in file.findings.counts.items()}
+        sums = FileSums(
+            low, self._reference[low:high],
+            np.stack([self._sums[name][low:high] for name in SUMS]),
+            np.array(self._stuck, dtype=np.int64).reshape(-1, 2),
+            np.array(self._clocks, dtype=float).reshape(-1, 2), tuple(counts),
+            np.array([[number, NOT_A_TIME if begin is None else begin,
+                       NOT_A_TIME if end is None else end]
+                      for number, begin, end in counts.values()], dtype=np.int64).reshape(-1, 3),
+        )  # fmt: skip
+        return None if first is None else FileSpan(first, last), sums
 
     def _find_new_rows(self, time, level, is_level, recent, file):
         """Mask (n,) of rows that do not repeat an earlier row; other values are problems."""
@@ -176,7 +288,7 @@ class LevelSums:
             return
         offset = find_offset_s(time, self.volume_m3(level), self.flows)
         if offset is not None:
-            self.offsets.append((int(time[0]), offset))
+            self._clocks.append((float(time[0]), offset))
             if abs(offset) > MOST_OFFSET_S + np.median(np.diff(time)) * 0.5e-9:
                 file.findings.add("levels", "clock_offset", time[[0, -1]], len(time))
 
@@ -209,12 +321,12 @@ class LevelSums:
 
     def means(self, findings):
         """`Pieces` with at least two readings, without those of a stuck float."""
-        sums = self._sums
+        reference, sums = self._total[0], dict(zip(SUMS, self._total[1], strict=True))
         n = np.maximum(sums["n"], 1)
         mean = sums["h"] / n
         variance = np.maximum(sums["hh"] / n - mean**2, 0.0) * n / np.maximum(n - 1, 1)
         is_stuck = np.zeros(len(n), dtype=bool)
-        for start, end in self._stuck:
+        for start, end in self._all_stuck:
             touched = (self.pieces[:, 1] > start) & (self.pieces[:, 0] < end)
             is_stuck |= touched
             findings.add("levels", "stuck", (start, end), int(sums["n"][touched].sum()))
@@ -222,7 +334,7 @@ class LevelSums:
             temperature, water = sums["T"] / sums["nT"], sums["w"] / sums["nw"]
         pieces = Pieces(
             self.window, self.pieces[:, 0] + (sums["t"] / n * 1e9).astype(np.int64),
-            self._reference + mean, np.sqrt(variance), sums["n"].astype(int), temperature, water,
+            reference + mean, np.sqrt(variance), sums["n"].astype(int), temperature, water,
         )  # fmt: skip
         return pieces.select((sums["n"] >= 2) & ~is_stuck)
 

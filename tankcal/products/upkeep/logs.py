@@ -100,6 +100,8 @@ class LogFile:
     findings : Findings
     log : Log
         Receives problems.
+    digest : str
+        SHA-256.
     """
 
     path: object
@@ -108,6 +110,7 @@ class LogFile:
     zone: str
     findings: Findings
     log: Log
+    digest: str = ""
 
     def chunks(self):
         """Yield chunks {column: values (n,)}; "row" is the row in the file.

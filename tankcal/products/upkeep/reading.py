@@ -1,18 +1,21 @@
 """Reading of an upkeep: upkeep.toml, meters.csv, the logs and the record of the tank."""
 
 import hashlib
-from dataclasses import dataclass
+import os
+from dataclasses import dataclass, replace
 from pathlib import Path
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 import numpy as np
 
+from tankcal import record as records
 from tankcal.errors import InputError, Problem
 from tankcal.job.contract.keys import CSV
 from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.entries import read_columns
 from tankcal.job.fields import Field
 from tankcal.job.folder import read_csv
+from tankcal.job.model import InputFile
 from tankcal.job.tables import Log, read_bytes, shown
 from tankcal.messages import message
 from tankcal.products.quantity.table import read_table
@@ -22,10 +25,12 @@ from tankcal.products.upkeep.flows import quiet_windows, read_flows
 from tankcal.products.upkeep.levels import MOST_OFFSET_S, LevelSums
 from tankcal.products.upkeep.logs import Findings, LogFile
 from tankcal.products.upkeep.profiles import read_log_profile
+from tankcal.products.upkeep.state import NO_STATE
 from tankcal.products.upkeep.steps import REASONS, StepRules, Tickets, build_steps
 from tankcal.record.manifest import digest_of
 from tankcal.text.shipped import LANGUAGES
 
+FIXED = ("settings", "record")  # kinds of files that are no logs
 SETTINGS, METERS = "upkeep.toml", "meters.csv"
 EVENTS = (
     "proving", "adjusted", "gauge_set", "dip", "water_drawn", "product_changed", "opened",
@@ -39,6 +44,7 @@ SERVICES = {  # settle_s, rest_h, least_delivery_m3, noise_mm if upkeep.toml dec
     "station": {"settle_s": 120.0, "rest_h": 2.0, "least_delivery_m3": 0.3, "noise_mm": 0.3},
     "terminal": {"settle_s": 1800.0, "rest_h": 12.0, "least_delivery_m3": 10.0, "noise_mm": 1.0},
 }
+UNTRACEABLE_PERCENT = 1.0  # u of the common factor of meters without a certificate
 UNUSED_WARNED, UNUSED_REFUSED = 0.05, 0.30  # share of the readings of a level log
 
 
@@ -113,9 +119,15 @@ class Inputs:
         Files in the order of reading; the first two are upkeep.toml and record.json.
     pieces : int
         Number of quiet pieces.
-    traceable : tuple of str
-        Meters with a certificate.
+    traceable : dict of {str: str}
+        Certificates of the traceable meters.
     warnings : tuple of Problem
+    folder : Path
+        Folder of upkeep.toml, from which the names of the files lead.
+    record_path : Path
+        Record of the table in force.
+    former_upkeep : dict or None
+        Everyday data that this table contains already.
     """
 
     sections: dict
@@ -124,8 +136,24 @@ class Inputs:
     findings: Findings
     sources: tuple
     pieces: int
-    traceable: tuple
+    traceable: dict
     warnings: tuple
+    folder: Path
+    record_path: Path
+    former_upkeep: dict | None
+
+    def files(self):
+        """`InputFile`s in the order of reading."""
+        return [InputFile(source.file, source.sha256, (self.folder / source.file).stat().st_size)
+                for source in self.sources]  # fmt: skip
+
+    def operation_of_meters(self):
+        """`Operation` whose common factor has the u of meters without a certificate, if so."""
+        if self.traceable:
+            return self.operation
+        priors = self.operation.priors
+        common = max(priors["meters_common_percent"], UNTRACEABLE_PERCENT)
+        return replace(self.operation, priors=priors | {"meters_common_percent": common})
 
     @property
     def table(self):
@@ -133,13 +161,15 @@ class Inputs:
         return self.operation.stock.table
 
 
-def read_upkeep(folder):
+def read_upkeep(folder, state=NO_STATE):
     """Read the settings and all logs of a tank, clean them and build its steps.
 
     Parameters
     ----------
     folder : path
         Folder with upkeep.toml, or its upkeep.toml.
+    state : state.State, optional
+        Results of earlier runs; sums of known files are taken from there.
 
     Returns
     -------
@@ -184,15 +214,28 @@ def read_upkeep(folder):
     table = read_table(path)
     findings, sources = Findings(), [
         LogSource("settings", settings.name, digest_of(settings)),
-        LogSource("record", path.name, table.digest),
+        LogSource("record", Path(os.path.relpath(path, folder)).as_posix(), table.digest),
     ]  # fmt: skip
     files = {
         kind: _log_files(kind, sections, folder, zone, findings, log, sources)
         for kind in ("events", "meters", "deliveries", "air", "levels")
     }
     meters = _read_meters(folder, marks, log, sources)
+    former = records.load(path).get("upkeep")
+    known = {source.sha256: source.file for source in sources if source.kind not in FIXED}
+    for digest in sorted(known.keys() & set(former["logs"] if former else ())):
+        log.problem(known[digest], message(
+            "upkeep_known_log", "the table in force contains this log; expected logs of a later "
+            "time: it would count twice"))  # fmt: skip
     log.stop_if_problems()
-    return _build(sections, table, meters, files, findings, sources, log)
+    inputs = _build(sections, table, meters, files, findings, sources, log, state)
+    first = np.datetime64(int(inputs.steps.marks.time_ns[0]), "ns").astype("datetime64[D]")
+    if former and first < np.datetime64(former["last"]):
+        text = message("upkeep_overlap", "steps from {first} on; the table in force contains data "
+                       "until {last}; expected later data: they would count twice",
+                       first=str(first), last=former["last"])  # fmt: skip
+        raise InputError(Problem(files["levels"][0].path.name, text))
+    return replace(inputs, folder=folder, record_path=path, former_upkeep=former)
 
 
 def _log_files(kind, sections, folder, zone, findings, log, sources):
@@ -216,8 +259,8 @@ def _log_files(kind, sections, folder, zone, findings, log, sources):
                                "each log once: it would count twice", twin=twin)  # fmt: skip
                 log.problem(path.name, text)
                 continue
-            sources.append(LogSource(kind, path.name, digest))
-            files.append(LogFile(path, kind, profile, zone, findings, log))
+            sources.append(LogSource(kind, path.relative_to(folder).as_posix(), digest))
+            files.append(LogFile(path, kind, profile, zone, findings, log, digest))
     return files if profile is not None else []
 
 
@@ -254,7 +297,7 @@ def _read_meters(folder, marks, log, sources):
     return meters
 
 
-def _build(sections, table, meters, files, findings, sources, log):
+def _build(sections, table, meters, files, findings, sources, log, state):
     """`Inputs` of the opened files."""
     service = sections["upkeep"]["service"]
     rules = fill_blanks(sections["gauge"], SERVICES[service])
@@ -274,7 +317,7 @@ def _build(sections, table, meters, files, findings, sources, log):
     last = max(flow.time_ns.max() for flow in flows if len(flow.time_ns)) + span
     windows = quiet_windows(flows, rules["settle_s"], first, last)
     sums = LevelSums(windows, quantum, flows, table.volume)
-    sums.read(files["levels"])
+    sums.read(files["levels"], state)
     log.stop_if_problems()
     pieces = sums.means(findings)
     inside = ~table.is_outside(pieces.level_m)
@@ -303,14 +346,14 @@ def _build(sections, table, meters, files, findings, sources, log):
         {kind: bool(sections[kind]["net"]) for kind in ("meters", "deliveries")},
         int(steps.marks.time_ns[0]),
     )  # fmt: skip
-    traceable = tuple(name for name, (_, certificate) in meters.items() if certificate)
+    traceable = {name: number for name, (_, number) in meters.items() if number}
     for flow in flows:
         if meters and flow.name not in meters:
             log.warning(METERS, message("upkeep_meter_unlisted", "meter {name} of the log is not "
                         "listed; its factor is taken as 1 with the prior u",
                         name=flow.name))  # fmt: skip
     return Inputs(sections, operation, steps, findings, tuple(sources), len(pieces), traceable,
-                  tuple(log.warnings))  # fmt: skip
+                  tuple(log.warnings), None, None, None)  # fmt: skip
 
 
 def _judge_cleaning(findings, file, log):

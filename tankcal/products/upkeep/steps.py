@@ -5,7 +5,7 @@ delivered by tickets, hours and temperatures. Steps that cannot be balanced keep
 reason, because causes that drift continue through them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -71,6 +71,16 @@ class Steps:
     def __len__(self):
         """Number of steps."""
         return len(self.reason)
+
+    def part(self, first, last):
+        """Steps first to last - 1, with their marks."""
+        marks = Marks(
+            **{name: values[first : last + 1] for name, values in vars(self.marks).items()}
+        )
+        return replace(self, marks=marks, **{
+            name: values[first:last] for name, values in vars(self).items()
+            if name not in ("marks", "meters")
+        })  # fmt: skip
 
     @property
     def seconds(self):

@@ -15,12 +15,12 @@ from tankcal.products.upkeep import saved
 from tankcal.products.upkeep.estimation import LEAST_RANGE, LEAST_STEPS, estimate
 from tankcal.products.upkeep.filtering import total_innovations, whiten_steps
 from tankcal.products.upkeep.reading import SETTINGS
+from tankcal.products.upkeep.state import NO_STATE
 from tankcal.products.upkeep.steps import REASONS
 from tankcal.products.upkeep.watching import SIR_SD, watch
 from tankcal.record.covariance_factor import blocks_of
 from tankcal.record.texts import warnings_of
 
-UNTRACEABLE_PERCENT = 1.0  # u of the common factor of meters without a certificate
 WIDE = 0.005  # relative u of the former contents above which only deliveries are stated
 GLOBAL_TEST = 1e-3  # least probability of chi-square for an improved table
 SIR_LIMIT_L_H = 0.757  # 0.2 gal/h, the rate of inventory reconciliation (40 CFR 280.43)
@@ -28,23 +28,22 @@ ROWS_SHOWN = 4  # deliveries between fifths of the seen levels
 VARIANCE_RATIO = 2.0  # of observed and declared variances, beyond which a warning is given
 
 
-def keep_up(inputs):
+def keep_up(inputs, state=NO_STATE):
     """Estimate the table and the meters of a tank, and watch it.
 
     Parameters
     ----------
     inputs : reading.Inputs
+    state : state.State, optional
+        Results of earlier runs.
 
     Returns
     -------
     saved.UpkeepFile
     """
-    sections, operation = inputs.sections, inputs.operation
+    sections, operation = inputs.sections, inputs.operation_of_meters()
     warnings = list(inputs.warnings)
-    if not inputs.traceable:
-        common = max(operation.priors["meters_common_percent"], UNTRACEABLE_PERCENT)
-        operation = replace(operation, priors=operation.priors | {"meters_common_percent": common})
-    estimation = estimate(operation, inputs.steps)
+    estimation = estimate(operation, inputs.steps, state=state)
     probability = sections["upkeep"]["coverage_probability"] or 0.95
     k = float(coverage_factor(probability, np.inf))
     ratio = estimation.triangle.chi2 / max(estimation.triangle.count, 1)
@@ -74,7 +73,7 @@ def keep_up(inputs):
     spread = k * table_scale * np.linalg.norm(factor, axis=1)
     seconds = np.append(0.0, np.cumsum(inputs.steps.seconds))
     start = inputs.steps.marks.time_ns[0]
-    watched = watch(estimation, sections["watch"]["false_alarm_per_year"] or 0.05)
+    watched = watch(estimation, sections["watch"]["false_alarm_per_year"] or 0.05, state)
 
     def day(at_s):
         return str(np.datetime64(int(start + at_s * 1e9), "ns").astype("datetime64[D]"))
@@ -227,7 +226,7 @@ def _meters(estimation, operation, inputs, factor, low, high, k, scale):
         metered = inputs.steps.sold_m3[:, inputs.steps.meters.index(name)].sum()
         meters.append(
             saved.UpkeepMeter(
-                name, float(metered), name if name in inputs.traceable else None,
+                name, float(metered), inputs.traceable.get(name),
                 float(k * np.linalg.norm(weights)), float(weights @ x), float(k * scale * sd),
                 float(weights @ covariance @ between / sd / sd_table),
             )
@@ -254,7 +253,7 @@ def _months(estimation, start_ns, k, scale):
     leak = inside * (drift.seconds / 3.6e6)[:, None]
     through = inside * (drift.metered_m3.sum(axis=1) / 100)[:, None]
     white = whiten_steps(drift, np.hstack([leak, through])).rows
-    both = total_innovations(estimation.whitened.rows, estimation.is_used, white)
+    both = total_innovations(estimation.rows, estimation.is_used, white)
     e, columns = both[:, 0], both[:, 1:]
     information = np.maximum(np.sum(columns**2, axis=0), 1e-12)
     sizes, sd = columns.T @ e / information, scale / np.sqrt(information)

@@ -17,7 +17,7 @@ from tankcal.report.attachments import sha256
 from tankcal.report.letterhead import LETTERHEAD_FILE
 from tankcal.report.outputs import csv_files
 from tankcal.report.papers import FILES as PAPER_FILES
-from tankcal.report.papers import build
+from tankcal.report.papers import build, is_certifiable
 from tankcal.text.shipped import LANGUAGES
 
 if TYPE_CHECKING:
@@ -197,7 +197,7 @@ def _write_papers(record, folder, progress, language, letterhead):
     digest = sha256((folder / RECORD).read_bytes())
     with without_collection():
         workbook.write(record, folder / name, language, digest)
-        if record["capacity"]:
+        if is_certifiable(record):
             (folder / dcc.FILE).write_bytes(dcc.certificate_xml(record, digest, language))
     build(
         folder / RECORD,
