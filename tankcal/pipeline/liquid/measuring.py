@@ -38,6 +38,7 @@ from tankcal.tank.liquid import Alternative, fill_of, name_causes, reduce_steps
 from tankcal.tank.liquid.reduction import as_fahrenheit, batch_sd_m3, swapped
 
 BALANCE = "balance"  # code of the principle: conservation of mass
+BY_LIQUID = message("by_liquid", "adjusted together with the metered volumes")
 OF_NO_WEIGHT_M = 1.0  # standard deviation of a dip without weight, m
 # Causes that change all volumes: the effect of an undetectable size of them is reported.
 CONTROLLED = ("meter", "leak")
@@ -113,8 +114,7 @@ class Measured:
             if correction.applied and correction.code != "tilt"
         )
         size = top_m3 - gross_m3 - sum_m3
-        formula = message("by_liquid", "adjusted together with the metered volumes")
-        return Correction("liquid", True, size, 100 * size / gross_m3, formula, BALANCE)
+        return Correction("liquid", True, size, 100 * size / gross_m3, BY_LIQUID, BALANCE)
 
     def result(self, levels_m):
         """Return the `LiquidResult` at the rows of a table."""

@@ -14,6 +14,7 @@ import scipy.linalg
 from tankcal import record as records
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
+from tankcal.pipeline.liquid.measuring import BALANCE, BY_LIQUID
 from tankcal.pipeline.tanks.corrections import Correction
 from tankcal.products.upkeep.estimation import estimate
 from tankcal.products.upkeep.reading import SETTINGS, read_upkeep
@@ -133,8 +134,7 @@ def _correction(former, change):
     """Effect of the everyday data at the top row, in the list of corrections."""
     size, gross = float(change[-1]), former["gross"]
     whole = gross["volume_m3"] if gross else former["capacity"]["volume_m3"][-1]
-    formula = message("by_liquid", "adjusted together with the metered volumes")
-    return Correction(KIND, True, size, 100 * size / whole, formula, "balance")
+    return Correction(KIND, True, size, 100 * size / whole, BY_LIQUID, BALANCE)
 
 
 def _notice(upkeep):
