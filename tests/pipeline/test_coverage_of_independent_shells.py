@@ -19,7 +19,7 @@ import test_coverage_of_walls as by_points
 from draws import draws
 from independent_shells import FAMILIES, NARROW_M, add_measured_bulge, make_shell, settle
 from joined_jobs import outside_job
-from page_figures import figures_of, ratios_agree, shares_agree
+from page_figures import agree, figures_of, ratios_agree, shares_agree
 from scipy.stats import binom
 from test_coverage_of_walls import ROWS, Found, judged
 
@@ -368,3 +368,16 @@ def test_the_silent_errors_are_those_of_the_page(tmp_path):
         shell = survey_shell(f"points, {rings} rings", family, seed, tmp_path / "job")
         assert shell.is_silent
         assert f"{shell.worst:.1f}" == stated
+    factors = [float(figures[1]) / FAR, float(figures[2]) / FAR]
+    assert agree(
+        factors,
+        figures_of(
+            "docs/studies/coverage.md",
+            "so that no table is silent, would be () with two rings and () with three",
+        ),
+    )
+    ratios = [float(figures_of(*ROWS_OF_PAGE[f"points, {n} rings"])[-1]) for n in ("two", "three")]
+    assert agree(
+        np.multiply(factors, ratios),
+        figures_of("docs/studies/coverage.md", "U over 1.96 rms errors would then be () and ()"),
+    )
