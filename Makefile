@@ -8,7 +8,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-slow test-rest test-all study study-full check format notebooks job-format schemas bench benchmark-page picture site site-of-notebooks wheel clean
+.PHONY: help demo test test-slow test-rest test-all study study-full check format notebooks job-format schemas bench benchmark-page picture site site-of-notebooks wheel offline frozen clean
 
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -86,6 +86,18 @@ site-of-notebooks: $(VENV)/docs # that were executed already
 
 wheel: $(VENV)/release ## wheel and source archive in dist/, built twice and compared; run from the wheel, away from here
 	.ci/wheel $(TAG)
+
+offline: $(VENV)/release ## after make wheel: zips that install tankcal without a network (Windows, macOS, Linux)
+	$(BIN)/python installers/offline.py dist/*.whl
+	if command -v makensis >/dev/null; then installers/windows.sh $(PYTHON_ZIP); else echo "no makensis here: the installer for Windows was not built"; fi
+	rm -rf build/offline/trial && mkdir -p build/offline/trial
+	cd build/offline/trial && ../../../$(BIN)/python -m zipfile -e ../../../dist/tankcal-offline-linux.zip . && \
+	  HOME=$$PWD PIP_NO_INDEX=1 PYTHON=python3 sh tankcal-offline/install.command
+	$(BIN)/python installers/try_app.py build/offline/trial/tankcal-app/bin/tankcal
+	rm -rf build/offline/trial
+
+frozen: $(VENV)/release ## after make wheel: a folder with Python and tankcal for Linux, tried (PyInstaller)
+	installers/frozen.sh dist/*.whl
 
 $(VENV)/base: pyproject.toml constraints.txt
 	@echo "setting up $(VENV), once: about 35 packages, 125 MB to fetch"

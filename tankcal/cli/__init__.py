@@ -19,6 +19,7 @@ from tankcal.terminal.showing import (
     failure,
     language_of_run,
     print_json,
+    say,
     say_in_language,
     speak,
     words_of_run,
@@ -66,13 +67,22 @@ def main(arguments=None):
     _open_closed_streams()
     _print_in_any_encoding()
     speak()
-    if arguments is None and len(sys.argv) == 1 and _has_display():
+    is_bare = arguments is None and len(sys.argv) == 1
+    if is_bare and _has_display():
         arguments = ["app"]  # as started by a double click
     with _translate_argparse(words_of_run()):
         options = _options(arguments)
         options.arguments = sys.argv[1:] if arguments is None else list(arguments)
         if options.command is None:
             options.shown.print_help()
+            if is_bare:
+                say(
+                    message(
+                        "no_display",
+                        "no display was found: 'tankcal app --no-browser' prints an address for a "
+                        "browser of this machine",
+                    )
+                )
             return 0
     try:
         with raise_at_signals():

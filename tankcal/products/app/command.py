@@ -75,6 +75,14 @@ def add(commands):
         "--role", choices=ROLES, action="append", help="with --add-user, a role; may be repeated"
     )
     app.add_argument("--no-browser", action="store_true", help="do not open a browser")
+    app.add_argument(
+        "--shortcut",
+        metavar="DIR",
+        nargs="?",
+        const="",
+        help="write a shortcut that opens the app into DIR (default: desktop and menu of the "
+        "user), and do not open it",
+    )
     app.set_defaults(command=run_app)
 
 
@@ -86,6 +94,12 @@ def _port(text):
 
 def run_app(options):
     """Serve the app until Ctrl-C, or open a window of the app that is already running."""
+    if options.shortcut is not None:
+        from tankcal.products.app.shortcuts import write_shortcuts
+
+        for path in write_shortcuts(options.shortcut or None):
+            say(message("shortcut_written", "shortcut: {path}", path=path))
+        return
     from tankcal.products.app import serving
 
     users = Path(options.users or serving.find_state_folder() / "users.toml")
@@ -138,6 +152,7 @@ def run_app(options):
             "app_address", "open {address} in a browser; Ctrl-C stops the server", address=address
         )
     )
+    sys.stdout.flush()  # a program that reads the address waits for it
     # A second start opens a window of the app of this machine only.
     restart = f"{scheme}://{outer}{base}/?token={token}"
     state_file = serving.write_state(site.state, restart) if people is None else None

@@ -28,6 +28,7 @@ def free_socket(address, port=0):
         bound = socket.socket(info[0], socket.SOCK_STREAM)
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         bound.bind((address, port or 0))
+        bound.listen()  # a browser that is opened before the server answers then waits
     except (OSError, OverflowError, UnicodeError) as error:
         reason = reason_of(error)
         expected = message(
