@@ -1,6 +1,19 @@
-"""From the raw tables of a job to a checked `Job`, or to the list of all its problems."""
+"""From the raw tables of a job to a checked `Job`, or to the list of all its problems.
+
+Measuring equipment of a survey, from the register of the laboratory (equipment.toml).
+
+The register is a file beside the job, or a file that several jobs share, named by
+survey.equipment_register. The certificate states the equipment used with its calibration. No value
+of the register enters a calculation.
+
+Last day of the next verification, for the certificate: of a named rule, or of the customer.
+
+A certificate has no recommendation of a calibration interval of the laboratory's own.
+"""
 
 from dataclasses import replace
+from datetime import date
+from pathlib import Path
 
 from tankcal.errors import SHEET
 from tankcal.job.assembly import Attached, make_frame, make_job, read_mesh_file
@@ -9,16 +22,20 @@ from tankcal.job.checks import check_all
 from tankcal.job.checks.extent import has_survey, is_sighted, is_strapped
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.entries import ColumnValues, kind_of, read_columns, read_register, read_settings
-from tankcal.job.equipment import add_shared_register, equipment_used
-from tankcal.job.model.settings import Overruling, Seal
-from tankcal.job.next_verification import read_next_verification
+from tankcal.job.fields import is_blank
+from tankcal.job.folder import MAX_SETTINGS_BYTES
+from tankcal.job.folder import read_register as parse_register
+from tankcal.job.model.settings import Equipment, NextVerification, Overruling, Seal
 from tankcal.job.rule_files import find_rule
 from tankcal.job.tables import (
     REGISTERS,
     SURVEY_TABLES,
     TABLES,
     TANK_TABLES,
+    fingerprint,
     missing_sheet,
+    nearest,
+    read_beside,
 )
 from tankcal.messages import message
 from tankcal.methods.base import methods, methods_for
@@ -246,3 +263,196 @@ def make_overrulings(table):
         )
         for point, reading_table, number, decision, reason, by, date, row in rows
     )
+
+
+# ---- measuring equipment
+
+EQUIPMENT, ENDING = "equipment", ".toml"
+REGISTER_KEY = f"{EQUIPMENT}_register"
+
+
+def add_shared_register(raw, log):
+    """Return the RawJob with the register that `survey.equipment_register` names, if any."""
+    key = (raw.settings or {}).get("survey", {}).get(REGISTER_KEY)
+    if key is None or is_blank(key.raw):
+        return raw
+    place, name = (raw.settings_file, key.row, f"survey.{REGISTER_KEY}"), str(key.raw)
+    if EQUIPMENT in raw.registers:
+        expected = message(
+            "two_equipment_registers",
+            "found {name} and {local}; expected one register of equipment",
+            name=name,
+            local=raw.file_of(EQUIPMENT),
+        )
+        log.problem(place[0], expected, *place[1:])
+        return raw
+    # A job may come from somebody else: only TOML files at a relative place are read.
+    if (
+        not name.lower().endswith(ENDING)
+        or Path(name).is_absolute()
+        or not (raw.folder / name).is_file()
+    ):
+        expected = message(
+            "no_equipment_register",
+            "found {name}; expected a TOML file at a place relative to the job, such as "
+            "../equipment.toml",
+            name=name,
+        )
+        log.problem(place[0], expected, *place[1:])
+        return raw
+    name = Path(name).as_posix()  # `tankcal verify` finds the file by this place
+    data, register, files = read_beside(raw.folder, name, log, MAX_SETTINGS_BYTES), None, raw.files
+    if data is not None:
+        register = parse_register(name, data, log, EQUIPMENT)
+        files = (*files, fingerprint(name, data))
+    return replace(raw, registers=raw.registers | {EQUIPMENT: register}, files=files)
+
+
+def equipment_used(survey, entries, raw, log):
+    """Return the `Equipment` of a survey; warn of calibrations that do not cover its date.
+
+    Parameters
+    ----------
+    survey : dict
+        Values of [survey].
+    entries : dict
+        {name: {key: value}} of the register.
+    raw : RawJob
+    log : Log
+
+    Returns
+    -------
+    tuple of Equipment
+        Those of `equipment_used`, otherwise all of the register.
+    """
+    register = raw.registers.get(EQUIPMENT)
+    if register is None and survey[REGISTER_KEY]:  # it could not be read: reported already
+        return ()
+    names = survey["equipment_used"] or tuple(entries)
+    unknown = [name for name in names if name not in entries]
+    for name in unknown:
+        expected = message(
+            "unknown_equipment",
+            "found {name!r}; expected a name of the register of equipment{hint}",
+            name=name,
+            hint=nearest(name, entries),
+        )
+        row = raw.settings["survey"]["equipment_used"].row
+        log.problem(raw.settings_file, expected, row, "survey.equipment_used")
+    used = tuple(
+        Equipment(name, **{key: str(value or "") for key, value in entries[name].items()})
+        for name in names
+        if name not in unknown
+    )
+    for item in used:
+        _check_dates(item, survey["date"], register, log)
+    return used
+
+
+def _check_dates(item, survey_date, register, log):
+    """Warn of a calibration that was due before the survey, or made after it."""
+    day = str(survey_date or "")
+    if not day:
+        return
+    entry = register.entries[item.name]
+    if item.due and item.due < day:
+        text = message(
+            "equipment_overdue",
+            "its calibration was due on {due}, before the survey of {day}",
+            due=item.due,
+            day=day,
+        )
+        log.warning(register.file, text, entry["due"].row, f"{item.name}.due")
+    if item.date and item.date > day:
+        text = message(
+            "equipment_calibrated_later",
+            "calibrated on {date}, after the survey of {day}",
+            date=item.date,
+            day=day,
+        )
+        log.warning(register.file, text, entry["date"].row, f"{item.name}.date")
+
+
+# ---- next verification
+
+_KEY = "certificate.next_verification_rule"
+_LYING = ("horizontal", "inclined")
+_KINDS = {  # kinds of tank in the terms of the rules: without, and with a floating roof
+    "vertical": (("vertical_fixed_roof",), ("vertical_floating_roof",)),
+    "horizontal": (_LYING, _LYING),
+    "sphere": (("sphere",), ("sphere",)),
+    "mesh": (("other",), ("other",)),
+}
+
+
+def read_next_verification(raw, values, log):
+    """Return the next verification of a job, and the fingerprint of a rule beside the job.
+
+    Parameters
+    ----------
+    raw : RawJob
+    values : dict of {str: dict}
+        {section: {key: value}} of the settings.
+    log : Log
+        Receives the problems; also a warning for a rule that was not compared with its text, whose
+        date no certificate states.
+
+    Returns
+    -------
+    tuple of (NextVerification or None, tuple or None)
+    """
+    certificate = values["certificate"]
+    wished, name = certificate["next_verification"], certificate["next_verification_rule"]
+    if name is None:
+        return (None if wished is None else NextVerification(str(wished))), None
+    row = raw.settings["certificate"]["next_verification_rule"].row
+    if wished is not None:
+        expected = message(
+            "two_next_verifications",
+            "given together with next_verification; expected the rule or the date for which the "
+            "customer asked",
+        )
+        log.problem(raw.settings_file, expected, row, _KEY)
+        return None, None
+    named = find_rule(raw, name, log, _KEY)
+    day = values["survey"]["date"]
+    if named is None or day is None or values["tank"]["kind"] is None:
+        return None, None
+    rule, file = named
+    period = _shortest_period(rule, values)
+    if period is None:
+        text = message(
+            "no_period_for_tank",
+            "the rule has no period for the whole of a tank of this kind; the certificate states "
+            "no date",
+        )
+    elif not period.verified:
+        text = message(
+            "period_not_read",
+            "the period of the rule was not compared with its text; the certificate states no date",
+        )
+    else:
+        last = _add_years(date.fromisoformat(str(day)), period.years)
+        return NextVerification(str(last), rule.name, period.clause, period.years), file
+    log.warning(raw.settings_file, text, row, _KEY)
+    return None, file
+
+
+def _shortest_period(rule, values):
+    """Return the shortest Period of the whole tank, or None."""
+    has_roof = values["roof"]["mass_kg"] is not None
+    kinds = _KINDS[values["tank"]["kind"]][has_roof]
+    periods = [
+        period
+        for period in rule.periods
+        if period.of == "all" and (not period.tanks or set(kinds) & set(period.tanks))
+    ]
+    return min(periods, key=lambda period: period.years, default=None)
+
+
+def _add_years(day, years):
+    """Return the day after a number of years; fractions of a year count as whole months."""
+    months = day.month - 1 + round(12 * years)
+    year, month = day.year + months // 12, months % 12 + 1
+    last_of_month = (date(year + month // 12, month % 12 + 1, 1) - date(year, month, 1)).days
+    return date(year, month, min(day.day, last_of_month))

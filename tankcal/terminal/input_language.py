@@ -67,8 +67,7 @@ def _read_settings(path, log):
 def _read_workbook(path, log):
     """Return the language in a job workbook."""
     from tankcal.job.excel import MAX_FILE_BYTES, Unreadable, read_sheets
-    from tankcal.job.grids import table_rows
-    from tankcal.job.sheets import KEY, SECTION, VALUE
+    from tankcal.job.sheets import KEY, SECTION, VALUE, table_rows
 
     data = read_bytes(path, log, MAX_FILE_BYTES)
     if data is None:

@@ -38,7 +38,7 @@ from tankcal.record.camera_parameters import plain_parameters
 from tankcal.record.camera_versions import FORMAT
 from tankcal.survey import adjust_survey
 from tankcal.survey.measurements import AdjustmentSettings
-from tankcal.survey.network.results import global_test
+from tankcal.survey.network.adjustment import global_test
 
 NAMES = ("c", "x0", "y0", "K1", "K2", "K3", "P1", "P2", "A", "B")
 DOF = (2470, 2462, 2532)  # published: P, Quadro 4

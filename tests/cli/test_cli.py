@@ -50,7 +50,11 @@ HEAVY = {  # what a run without papers has no need of, and waits for when it is 
     *("matplotlib", "openpyxl", "xlsxwriter", "nbformat", "nbclient", "trimesh", "typst"),
 }
 SURVEYS = {  # of kinds that only some jobs have
-    *("tankcal.survey.adjustment", "tankcal.survey.network.results", "tankcal.survey.observations"),
+    *(
+        "tankcal.survey.adjustment",
+        "tankcal.survey.network.adjustment",
+        "tankcal.survey.observations",
+    ),
     *(
         "tankcal.methods.strapping.wall",
         "tankcal.methods.hits.wall",

@@ -14,9 +14,8 @@ from draws import draws
 from scipy.optimize import brentq
 
 from tankcal.gum.distributions import Normal
-from tankcal.gum.monte_carlo import Goal, QuadraticRows, simulate
+from tankcal.gum.monte_carlo import Goal, QuadraticRows, simulate, simulate_in_batches
 from tankcal.gum.monte_carlo.inputs import inputs_of
-from tankcal.gum.monte_carlo.simulation import simulate_in_batches
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
 

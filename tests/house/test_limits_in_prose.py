@@ -11,9 +11,9 @@ from page_sessions import ROOT
 from scipy import stats
 
 from tankcal import adjust, units
+from tankcal import clouds as cloud_reading
 from tankcal.calibration.parameters import recommendation, significance
 from tankcal.calibration.targets import coded
-from tankcal.clouds import reading as cloud_reading
 from tankcal.clouds.formats import counted_text, e57, isolation, lines
 from tankcal.clouds.inside import bottom as cloud_bottom
 from tankcal.clouds.inside import floor_cells
@@ -39,7 +39,7 @@ from tankcal.methods.inside_hits import solid as inside_solid
 from tankcal.methods.lines import warnings
 from tankcal.methods.lines import warnings as lines_warnings
 from tankcal.methods.liquid import columns as liquid_columns
-from tankcal.methods.liquid import facts as liquid_facts
+from tankcal.methods.liquid import tables as liquid_facts
 from tankcal.methods.strapping import tape_warnings
 from tankcal.pipeline import cluster, scanned_solids
 from tankcal.pipeline import overruling_effects as overruling

@@ -11,7 +11,7 @@ from conftest import EXAMPLE
 import tankcal
 from tankcal.cli import main
 from tankcal.errors import InputError
-from tankcal.job.next_verification import _add_years
+from tankcal.job.building import _add_years
 from tankcal.job.rule_files import parse_rule
 from tankcal.job.tables import Log
 from tankcal.tank.rules.model import PLATE

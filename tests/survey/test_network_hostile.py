@@ -12,7 +12,7 @@ from tankcal.errors import SolutionError
 from tankcal.geometry.rotations import rotation_of_view
 from tankcal.survey.network import Camera, Photos, Survey, adjust
 from tankcal.survey.network.adjustment import find_hardly_determined
-from tankcal.survey.network.unknowns import describe_directions
+from tankcal.survey.network.assembly import describe_directions
 from tankcal.survey.observations import ControlCoordinates, Distances, ImageCoordinates
 
 SQUARE = np.column_stack(

@@ -12,8 +12,7 @@ import scipy.optimize
 from scipy.spatial.transform import Rotation
 
 from tankcal.errors import SolutionError
-from tankcal.survey.pose_network import fit_motion
-from tankcal.survey.registration import register
+from tankcal.survey.registration import fit_motion, register
 from tankcal.survey.scans import KnownTargets, ScanSetup, ScanTarget
 from tankcal.survey.wall_hits import RangingInstrument
 

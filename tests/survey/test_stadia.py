@@ -11,8 +11,8 @@ from job_builder import tangent_parts, write_book, write_folder
 
 import tankcal
 from tankcal.errors import InputError
-from tankcal.methods.hits.checks import ranging_of
-from tankcal.methods.lines.checks import plummets_of
+from tankcal.methods.hits.readings import ranging_of
+from tankcal.methods.lines.readings import plummets_of
 from tankcal.pipeline.checks.instruments import check_bases
 
 BAR = {"kind": "stadia", "length_m": 2.0, "u_mm": 0.02, "certificate": "B-1"}

@@ -8,8 +8,8 @@ from networks import photographed
 
 from tankcal.errors import SolutionError
 from tankcal.survey.network import adjust
-from tankcal.survey.start.approximation import approximate, nominal_places
 from tankcal.survey.start.photographs import bearings, image_errors, three_point_poses
+from tankcal.survey.start_values import approximate, nominal_places
 
 
 def unknown_photos(survey):

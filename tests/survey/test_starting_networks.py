@@ -19,8 +19,8 @@ from tankcal.survey.observations import (
     HorizontalAngles,
     VerticalAngles,
 )
-from tankcal.survey.start.approximation import approximate
 from tankcal.survey.start.polar import free_station, place
+from tankcal.survey.start_values import approximate
 
 SD_ANGLE, SD_M = 1e-5, 1e-3
 SQUARE = np.array(

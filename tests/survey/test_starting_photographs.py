@@ -14,9 +14,9 @@ from tankcal.errors import SolutionError
 from tankcal.geometry.rotations import apply_small_rotation, rotation_of_angles, rotation_of_view
 from tankcal.survey.network import Camera, Photos, Survey, adjust
 from tankcal.survey.observations import ImageCoordinates, State
-from tankcal.survey.start.approximation import approximate
+from tankcal.survey.start.loose_frames import essential_matrices, relative_poses
 from tankcal.survey.start.photographs import Wall, bearings
-from tankcal.survey.start.relative import essential_matrices, relative_poses
+from tankcal.survey.start_values import approximate
 
 IDEAL = np.where(np.arange(13) < 1, 100.0, 0.0)
 

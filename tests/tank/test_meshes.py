@@ -16,11 +16,11 @@ from tankcal.tank.meshes import (
     closed_mesh,
     loft,
     mesh_part,
+    parse_mesh,
     read_mesh,
     shell_bands,
     write_mesh,
 )
-from tankcal.tank.meshes.files import parse_mesh
 from tankcal.tank.meshes.part import sums_below
 from tankcal.tank.volumes import ShellVolume
 

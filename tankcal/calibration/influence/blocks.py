@@ -20,9 +20,9 @@ from tankcal.pipeline.chain import run
 from tankcal.pipeline.checks.survey import refuse_undetermined
 from tankcal.pipeline.wall.surveyed import s_transform
 from tankcal.survey import wall_points
+from tankcal.survey.network.adjustment import GlobalTest
 from tankcal.survey.network.assembly import assemble
 from tankcal.survey.network.datum import motion_derivatives, null_space
-from tankcal.survey.network.results import GlobalTest
 
 MAX_ITERATIONS = 20  # largest number of iterations of the alignment
 CONVERGENCE = 1e-13  # largest last step of the alignment, relative to the size of the block

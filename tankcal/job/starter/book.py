@@ -8,9 +8,8 @@ import xlsxwriter
 from tankcal.job.certificate_entries import MARKED
 from tankcal.job.sheets import SECTION
 from tankcal.job.starter.examples import EXAMPLES_OF_KEYS
-from tankcal.job.starter.look import LINE_PT, Look, lines_of, print_on_a4
 from tankcal.job.starter.settings_sheet import Entry, Group, write_settings
-from tankcal.job.starter.table_sheet import write_table
+from tankcal.job.starter.table_sheet import LINE_PT, Look, lines_of, print_on_a4, write_table
 from tankcal.job.starter.texts import texts_in
 from tankcal.job.tables import REGISTERS, SETTINGS_SHEET
 

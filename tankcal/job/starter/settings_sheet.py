@@ -7,10 +7,15 @@ from xlsxwriter.utility import xl_rowcol_to_cell
 
 from tankcal.job.fields import Field
 from tankcal.job.sheets import KEY, VALUE
-from tankcal.job.starter.look import LINE_PT, lines_of, print_on_a4, type_of_cell
-from tankcal.job.starter.table_sheet import MARK
+from tankcal.job.starter.table_sheet import (
+    LINE_PT,
+    MARK,
+    lines_of,
+    print_on_a4,
+    rule_of,
+    type_of_cell,
+)
 from tankcal.job.starter.texts import is_number, split_unit
-from tankcal.job.starter.validation import rule_of
 
 TITLE, NOTE, RULE, LABELS, CODES = range(5)
 _MARK, _NOTE, _VALUE, _UNIT, _EXAMPLE, _OWNER, _KEY = range(7)

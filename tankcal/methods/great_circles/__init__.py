@@ -37,7 +37,7 @@ class GreatCirclesMethod(Method):
         return {"great_circles": list(EXAMPLES)}
 
     def check(self, values, tables, registers, raw, log):
-        from tankcal.methods.great_circles.checks import check_great_circles
+        from tankcal.methods.great_circles.readings import check_great_circles
 
         check_great_circles(values, tables, registers, raw, log, is_given=self.is_given(tables))
 

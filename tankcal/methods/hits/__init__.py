@@ -49,7 +49,7 @@ class HitsMethod(Method):
         return message("no_rows_of_hits", "no rows; expected a sight to the wall in each")
 
     def check(self, values, tables, registers, raw, log):
-        from tankcal.methods.hits.checks import check_hits
+        from tankcal.methods.hits.readings import check_hits
 
         check_hits(values, tables, registers, raw, log)
 

@@ -15,7 +15,7 @@ import numpy as np
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.geometry.circles import taubin_circle
 from tankcal.messages import list_some, message
-from tankcal.methods.hits.checks import offset_unknown
+from tankcal.methods.hits.readings import offset_unknown
 from tankcal.pipeline.wall.finding import find_wall, joints_of, take_points, through_wall
 from tankcal.pipeline.wall.shared_unknowns import told_causes
 from tankcal.pipeline.wall.surveyed import s_transform

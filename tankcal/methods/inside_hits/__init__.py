@@ -35,7 +35,7 @@ class InsideHitsMethod(Method):
         return {"survey.side": "inside"}
 
     def check(self, values, tables, registers, raw, log):
-        from tankcal.methods.inside_hits.checks import check_inside_hits
+        from tankcal.methods.inside_hits.readings import check_inside_hits
 
         check_inside_hits(values, tables, registers, raw, log)
 

@@ -21,7 +21,7 @@ import numpy as np
 from tankcal.errors import InputError, Problem
 from tankcal.geometry.cylinders import FittedCylinder
 from tankcal.messages import message
-from tankcal.methods.inside_hits.checks import offset_undeclared, untied_setup
+from tankcal.methods.inside_hits.readings import offset_undeclared, untied_setup
 from tankcal.pipeline.overruling import decisions_of
 from tankcal.pipeline.scanned_solids import NEVER_M, NEVER_PART, fit_scan, offsets
 from tankcal.pipeline.wall.finding import take_points

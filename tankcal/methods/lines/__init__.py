@@ -56,7 +56,7 @@ class LinesMethod(Method):
         return any(has_rows(tables[name]) for name in self.tables)
 
     def check(self, values, tables, registers, raw, log):
-        from tankcal.methods.lines.checks import check_lines
+        from tankcal.methods.lines.readings import check_lines
 
         if self.is_given(tables):
             check_lines(values, tables, registers, raw, log)

@@ -28,7 +28,7 @@ class PointsMethod(Method):
         return EXAMPLES
 
     def check(self, values, tables, registers, raw, log):
-        from tankcal.methods.points.checks import check_points_of
+        from tankcal.methods.points.readings import check_points_of
 
         check_points_of(values, tables, raw, log)
 

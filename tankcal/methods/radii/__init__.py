@@ -61,12 +61,12 @@ class RadiiMethod(Method):
         return message("no_rows_of_radii", "no rows; expected the radius of each course")
 
     def check(self, values, tables, registers, raw, log):
-        from tankcal.methods.radii.checks import check_radii
+        from tankcal.methods.radii.readings import check_radii
 
         check_radii(values, tables, raw, log)
 
     def useless_inputs(self, values, tables):
-        from tankcal.methods.radii.checks import useless_inputs
+        from tankcal.methods.radii.readings import useless_inputs
 
         return useless_inputs(values, tables)
 

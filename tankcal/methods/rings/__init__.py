@@ -34,7 +34,7 @@ class RingsMethod(Method):
         return EXAMPLES
 
     def check(self, values, tables, registers, raw, log):
-        from tankcal.methods.rings.checks import check_rings
+        from tankcal.methods.rings.readings import check_rings
 
         check_rings(values, tables, registers, raw, log)
 

@@ -79,7 +79,7 @@ class StrappingMethod(Method):
 
     def check(self, values, tables, registers, raw, log):
         from tankcal.job.entries import kind_of
-        from tankcal.methods.strapping.checks import check_strapping
+        from tankcal.methods.strapping.readings import check_strapping
 
         if kind_of(raw) == "vertical":
             check_strapping(values, tables, registers, raw, log)

@@ -50,7 +50,7 @@ class TangentsMethod(Method):
 
     def check(self, values, tables, registers, raw, log):
         if self.is_given(tables):
-            from tankcal.methods.tangents.checks import check_tangents
+            from tankcal.methods.tangents.readings import check_tangents
 
             check_tangents(values, tables, registers, raw, log)
 

@@ -5,8 +5,8 @@ Names are imported on first use, so that reading a job imports a Camera but not 
 
 from importlib import import_module
 
-_ROOM_OF = {
-    "Adjusted": "results",
+_MODULE_OF = {
+    "Adjusted": "adjustment",
     "Camera": "survey",
     "CleanedSurvey": "snooping",
     "Instrument": "survey",
@@ -15,15 +15,15 @@ _ROOM_OF = {
     "Survey": "survey",
     "System": "survey",
     "adjust": "adjustment",
-    "correlations": "results",
+    "correlations": "adjustment",
     "predict": "adjustment",
     "snoop": "snooping",
 }
 
-__all__ = [*_ROOM_OF]
+__all__ = [*_MODULE_OF]
 
 
 def __getattr__(name):
-    if name not in _ROOM_OF:
+    if name not in _MODULE_OF:
         raise AttributeError(f"module 'tankcal.survey.network' has no attribute {name!r}")
-    return getattr(import_module(f"tankcal.survey.network.{_ROOM_OF[name]}"), name)
+    return getattr(import_module(f"tankcal.survey.network.{_MODULE_OF[name]}"), name)

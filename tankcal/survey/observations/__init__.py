@@ -9,7 +9,7 @@ of the class: `instrument`, `set`, `origin`, `horizontal`, `rise_m`, `bend_per_m
 
 from dataclasses import dataclass, field
 
-from tankcal.survey.observations.base import NUISANCES, Layout, Observations, State
+from tankcal.survey.observations.base import NUISANCES, Layout, Observations, Source, State, Trace
 from tankcal.survey.observations.coordinates import (
     Block,
     ControlCoordinates,
@@ -34,7 +34,6 @@ from tankcal.survey.observations.sights import (
     Sights,
     VerticalAngles,
 )
-from tankcal.survey.observations.trace import Source, Trace
 
 __all__ = [
     "KINDS",
