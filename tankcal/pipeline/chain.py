@@ -180,7 +180,7 @@ def _collect_warnings(job, adjustment, sighting, survey, tabulation, supplemente
 
 def _base_warnings(job, adjustment):
     """Warnings of the bases measured by stadia."""
-    from tankcal.pipeline.checks.instruments import check_bases, check_rejected_bases
+    from tankcal.pipeline.checks.survey import check_bases, check_rejected_bases
 
     rejected = check_rejected_bases(job.measurements, adjustment.readings)
     return (*check_bases(job.measurements), *rejected)

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 from tankcal.job.contract import columns_of
 from tankcal.job.contract.registers import RANGING
-from tankcal.job.fields import Field
-from tankcal.job.shared_columns import ANGLE_UNITS
+from tankcal.job.fields import ANGLE_UNITS, Field
 from tankcal.messages import message
 
 PLAN_FILE = "plan.toml"

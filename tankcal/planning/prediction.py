@@ -8,8 +8,7 @@ import numpy as np
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import list_some, message
-from tankcal.pipeline.checks.instruments import check_bases
-from tankcal.pipeline.checks.survey import SHOWN, VAGUE, open_questions
+from tankcal.pipeline.checks.survey import SHOWN, VAGUE, check_bases, open_questions
 from tankcal.pipeline.checks.wall import OF_SCATTER
 from tankcal.pipeline.table import check_table
 from tankcal.planning.contract import PLAN_FILE

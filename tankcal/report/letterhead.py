@@ -14,8 +14,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from tankcal.errors import InputError, Problem, reason_of
-from tankcal.job.contract.kinds import KINDS
-from tankcal.job.contract.shorthand import number, positive
+from tankcal.job.contract.shorthand import KINDS, number, positive
 from tankcal.job.entries import read_section
 from tankcal.job.fields import Field
 from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml

@@ -5,7 +5,7 @@ from plan_folders import PLAN
 from wall_plan_folders import HITS, plan_of
 
 from tankcal.cli import main
-from tankcal.cli.plan_items import KINDS, describe_count
+from tankcal.cli.planning import KINDS, describe_count
 from tankcal.text.shipped import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words, message_sentence
 

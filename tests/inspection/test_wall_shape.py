@@ -13,8 +13,8 @@ from tankcal.pipeline.wall.finding import find_wall
 from tankcal.pipeline.wall.shape import LOW_M, wall_shape_of
 from tankcal.products.inspection.rules import limit_of, make_check, shipped_names, shipped_rule
 from tankcal.products.inspection.shape import Sizes, inspect_shape, spread_of
+from tankcal.record.making import shape_record
 from tankcal.record.schema import to_plain
-from tankcal.record.wall_shape import shape_record
 
 LEAN_OF_PAGE = (2.10e-3, -1.30e-3)
 

@@ -10,7 +10,7 @@ from tables_of_others import AREA_M2, BARREL, FOOT_M, INCH_M, US_GALLON, columns
 from tankcal.errors import InputError
 from tankcal.job.tables import Log
 from tankcal.products.linter.linting import lint
-from tankcal.products.linter.rows import read_rows
+from tankcal.products.recalibration.reading import read_rows
 
 MM = [k / 1000 for k in range(10)]
 VULGAR = {1: "¼", 2: "½", 3: "¾"}

@@ -18,7 +18,7 @@ from tankcal.errors import InputError
 from tankcal.job.tables import Log
 from tankcal.products.linter.headings import heading_of
 from tankcal.products.linter.linting import lint
-from tankcal.products.linter.rows import read_rows
+from tankcal.products.recalibration.reading import read_rows
 from tankcal.text.words import load_words, say
 
 CM = [k / 100 for k in range(101)]

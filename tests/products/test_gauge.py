@@ -26,8 +26,7 @@ from tankcal.products.gauge.deviation import (
     tilt_of_slope,
 )
 from tankcal.products.gauge.paper import DOCUMENT, GaugePaper
-from tankcal.products.gauge.reading import UNCERTAINTIES, read_comparison, shell_of
-from tankcal.products.gauge.starter import write_starter
+from tankcal.products.gauge.reading import UNCERTAINTIES, read_comparison, shell_of, write_starter
 from tankcal.record.schema import to_plain
 from tankcal.report.verification import verify
 from tankcal.text.shipped import LANGUAGES, shipped_folder

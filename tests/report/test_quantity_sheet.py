@@ -28,8 +28,7 @@ from tankcal.products.quantity.table import read_table
 from tankcal.report.workbook.book import Book
 from tankcal.report.workbook.calculator import factor_sheet
 from tankcal.report.workbook.capacity import capacity_sheet
-from tankcal.report.workbook.quantity import quantity_sheets
-from tankcal.report.workbook.quantity.form import FORM, KEYS
+from tankcal.report.workbook.quantity import FORM, KEYS, quantity_sheets
 from tankcal.report.workbook.quantity.uncertainty import QUANTITIES as OF_SHEET
 from tankcal.tank.gauging import FIELDS_OF_U
 from tankcal.text.words import load_words, translate_record

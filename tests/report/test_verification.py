@@ -22,8 +22,8 @@ from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.record.manifest import PACKAGES
 from tankcal.report.comparison import write_comparison
-from tankcal.report.paper_content import content_of_paper
 from tankcal.report.verification import verify
+from tankcal.report.verified_again import content_of_paper
 
 pytestmark = pytest.mark.slow
 

@@ -17,8 +17,8 @@ from tankcal.geometry.field.amplitudes import Amplitudes
 from tankcal.geometry.field.components import COMPONENTS
 from tankcal.geometry.field.estimate import WallField
 from tankcal.geometry.field.sites import Sites
+from tankcal.methods.hits.warnings import drifts_of, repeats_of
 from tankcal.pipeline.wall.shared_unknowns import told_causes
-from tankcal.survey.control_drift import drifts_of, repeats_of
 from tankcal.survey.measurements import Setup
 from tankcal.survey.points import Points
 from tankcal.survey.results import Cause

@@ -19,12 +19,12 @@ from tankcal.job.contract import (
     welds,
 )
 from tankcal.job.contract.keys import KEYS as COMMON_KEYS
-from tankcal.job.contract.kinds import KINDS
 from tankcal.job.contract.lying import KEYS as LYING_KEYS
 from tankcal.job.contract.observations import COLUMNS as SURVEY_COLUMNS
 from tankcal.job.contract.observations import SURVEYS as ADJUSTED_SURVEYS
 from tankcal.job.contract.parts import KEYS as PART_KEYS
 from tankcal.job.contract.registers import OF_PHOTOS, REGISTER_KEYS, REGISTERS_OF_SURVEY
+from tankcal.job.contract.shorthand import KINDS
 from tankcal.job.contract.uncertainty import INPUTS
 from tankcal.methods.base import methods
 from tankcal.text.form_words import NOTES

@@ -1,8 +1,15 @@
 """Keys of job.toml that all or most kinds of tank have."""
 
-from tankcal.job.contract.kinds import KINDS, LOADED, VERTICAL, WITH_POINTS
 from tankcal.job.contract.registers import CAMERA_SETTINGS
-from tankcal.job.contract.shorthand import choice, number, positive
+from tankcal.job.contract.shorthand import (
+    KINDS,
+    LOADED,
+    VERTICAL,
+    WITH_POINTS,
+    choice,
+    number,
+    positive,
+)
 from tankcal.job.fields import Field
 from tankcal.text.shipped import LANGUAGES
 

@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from tankcal.job.fields import Field
-from tankcal.job.shared_columns import FULL_CIRCLE, USE, angle_fields
+from tankcal.job.fields import FULL_CIRCLE, USE, Field, angle_fields
 
 
 def _name(name, note, required=True):

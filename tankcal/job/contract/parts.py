@@ -1,7 +1,6 @@
 """Keys of [mesh], [corrections], [checks] and [inspection], most of them for some kinds only."""
 
-from tankcal.job.contract.kinds import LOADED, VERTICAL, WITH_POINTS
-from tankcal.job.contract.shorthand import choice, number, positive
+from tankcal.job.contract.shorthand import LOADED, VERTICAL, WITH_POINTS, choice, number, positive
 from tankcal.job.fields import Field
 from tankcal.job.plausibility import DIAMETERS, MOST_YIELD_MPA, SERVICES, SHELLS, TARGETS
 from tankcal.units import FOOT_M, INCH_M

@@ -1,8 +1,7 @@
 """Keys of [roof], and checks that they are complete and plausible for the tank."""
 
 from tankcal.job.checking import RELATIVE_DENSITY, is_not_given, missing_beside, tell
-from tankcal.job.contract.kinds import VERTICAL
-from tankcal.job.contract.shorthand import choice, number, positive
+from tankcal.job.contract.shorthand import VERTICAL, choice, number, positive
 from tankcal.job.plausibility import ROOF_KG_M2
 from tankcal.messages import message
 from tankcal.methods.base import methods

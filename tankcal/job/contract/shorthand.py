@@ -20,3 +20,11 @@ def positive(name, note, high=inf, **more):
 def choice(name, note, choices, **more):
     """Return a `Field` for a word of `choices`."""
     return Field(name, "choice", note, choices=choices, **more)
+
+
+KINDS = ("vertical", "horizontal", "sphere", "mesh")
+VERTICAL = ("vertical",)
+LYING = ("horizontal",)
+STRAPPED = ("vertical", "horizontal")
+LOADED = ("vertical", "sphere")  # kinds whose wall expands under the load of the content
+WITH_POINTS = ("vertical", "horizontal", "sphere")

@@ -5,8 +5,15 @@ from math import degrees, pi
 
 from tankcal.gum.distributions import FAMILIES, expanded, within
 from tankcal.job.checking import refuse_repeated
-from tankcal.job.contract.kinds import KINDS, LOADED, STRAPPED, VERTICAL, WITH_POINTS
-from tankcal.job.contract.shorthand import choice, number
+from tankcal.job.contract.shorthand import (
+    KINDS,
+    LOADED,
+    STRAPPED,
+    VERTICAL,
+    WITH_POINTS,
+    choice,
+    number,
+)
 from tankcal.job.fields import Field
 from tankcal.messages import message
 

@@ -1,9 +1,7 @@
 """Keys of clouds.toml, with a section for each scanner file, and the table of scan targets."""
 
-from tankcal.job.contract.kinds import WITH_POINTS
-from tankcal.job.contract.shorthand import FREE, choice, number, positive
-from tankcal.job.fields import Field
-from tankcal.job.shared_columns import SURFACES
+from tankcal.job.contract.shorthand import FREE, WITH_POINTS, choice, number, positive
+from tankcal.job.fields import SURFACES, Field
 from tankcal.units import FOOT_M, INCH_M, US_SURVEY_FOOT_M
 
 UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": FOOT_M, "us_ft": US_SURVEY_FOOT_M, "in": INCH_M}

@@ -7,7 +7,7 @@ from tankcal.messages import message
 from tankcal.methods.clouds.bottom import check_inside
 from tankcal.methods.clouds.overlaps import overlap_test, overlaps_of, scans_apart
 from tankcal.methods.clouds.wall import FILE, TARGETS
-from tankcal.pipeline.checks.instruments import causes_unlike_certificates
+from tankcal.pipeline.checks.survey import causes_unlike_certificates
 
 HIDDEN = 0.25  # largest share of hidden cells of a course: their form is only interpolated
 LEAST_OF_WALL = 0.01  # smallest share of wall points in a scan

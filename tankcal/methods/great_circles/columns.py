@@ -1,7 +1,6 @@
 """Columns of great_circles.csv: equator and meridians of a sphere by tape."""
 
-from tankcal.job.fields import Field
-from tankcal.job.shared_columns import NOTE, USE, readings_by_tape
+from tankcal.job.fields import NOTE, USE, Field, readings_by_tape
 
 KINDS = ("equator", "meridian")
 GREAT_CIRCLES = (

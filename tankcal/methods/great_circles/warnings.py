@@ -9,8 +9,8 @@ from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.methods.strapping import tape_warnings
 from tankcal.methods.strapping.warnings import FAR_LIMITS, check_repeats, limit_of_repeats
-from tankcal.pipeline.checks.instruments import limits_of_method
 from tankcal.pipeline.checks.size import allowed_departure_m
+from tankcal.pipeline.checks.survey import limits_of_method
 
 FILE = "great_circles.csv"
 

@@ -1,7 +1,6 @@
 """Tables of total station hits on the bare wall, and of control targets read between them."""
 
-from tankcal.job.fields import Field
-from tankcal.job.shared_columns import SURFACES, USE, angle_fields
+from tankcal.job.fields import SURFACES, USE, Field, angle_fields
 
 
 def _time(required=False):

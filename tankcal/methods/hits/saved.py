@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from tankcal.methods.hits.warnings import drifts_of, repeats_of
 from tankcal.record.ranging import SharedByHits, departure_from_sections, shared_of
 from tankcal.record.schema import Finite, Saved, key
-from tankcal.survey.control_drift import drifts_of, repeats_of
 from tankcal.units import HOUR_S
 
 CLASS_DEG, LAST_DEG = 10, 90  # width of the classes of incidence, and their end

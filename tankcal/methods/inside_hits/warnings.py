@@ -6,7 +6,7 @@ from tankcal.errors import Problem
 from tankcal.messages import list_some, message
 from tankcal.methods.hits.warnings import check_control, check_incidence
 from tankcal.methods.inside_hits.solid import is_accepted
-from tankcal.pipeline.checks.instruments import limits_of_method
+from tankcal.pipeline.checks.survey import limits_of_method
 from tankcal.units import FULL_TURN
 
 SHOWN = 8  # largest number of rows in a message

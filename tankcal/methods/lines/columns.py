@@ -1,7 +1,6 @@
 """Tables of reference lines: lines of sight round a tank and offsets of the wall from them."""
 
-from tankcal.job.fields import Field
-from tankcal.job.shared_columns import USE
+from tankcal.job.fields import USE, Field
 
 LINES = (
     Field("line", "name", "name of the reference line", required=True),

@@ -1,9 +1,7 @@
 """Keys of meters.toml and [liquid], and columns of liquid.csv, for calibration with liquid."""
 
-from tankcal.job.contract.kinds import VERTICAL
-from tankcal.job.contract.shorthand import choice, number, positive
-from tankcal.job.fields import Field
-from tankcal.job.shared_columns import NOTE
+from tankcal.job.contract.shorthand import VERTICAL, choice, number, positive
+from tankcal.job.fields import NOTE, Field
 
 JOINT, ALONE, GEOMETRY = TABLES = ("joint", "liquid", "geometry")  # which table is printed
 EXPANSION_SHARE = 0.05  # default relative standard uncertainty of the liquid's expansion

@@ -17,8 +17,8 @@ from tankcal.methods.strapping.warnings import (
     read_once,
     straps_apart,
 )
-from tankcal.pipeline.checks.instruments import limits_of
 from tankcal.pipeline.checks.size import allowed_departure_m, check_side, departure_of_size
+from tankcal.pipeline.checks.survey import limits_of
 from tankcal.pipeline.read_wall import names_of
 from tankcal.pipeline.taped_wall import exchanged_courses
 

@@ -1,8 +1,7 @@
 """Tables and keys of strapping: circumferences, obstructions, plate thicknesses."""
 
-from tankcal.job.contract.kinds import LYING, STRAPPED, VERTICAL
-from tankcal.job.fields import Field
-from tankcal.job.shared_columns import NOTE, USE, readings_by_tape
+from tankcal.job.contract.shorthand import LYING, STRAPPED, VERTICAL
+from tankcal.job.fields import NOTE, USE, Field, readings_by_tape
 from tankcal.survey.strapping import KINDS
 
 

@@ -7,7 +7,7 @@ from scipy.special import bdtrc, chdtrc, erf, pdtrc
 
 from tankcal.errors import Problem
 from tankcal.messages import message
-from tankcal.pipeline.checks.instruments import limits_of
+from tankcal.pipeline.checks.survey import limits_of
 from tankcal.units import STANDARD_GRAVITY
 
 FILE, TAPES, COMPARED = "circumferences.csv", "instruments.toml", "tape_checks.csv"

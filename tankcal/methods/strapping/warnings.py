@@ -11,7 +11,6 @@ from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.methods.base import completing_method
 from tankcal.methods.strapping.tape_warnings import check_tapes
-from tankcal.pipeline.checks.instruments import limit_at, limits_of
 from tankcal.pipeline.checks.moved_setups import tested
 from tankcal.pipeline.checks.size import (
     allowed_departure_m,
@@ -20,6 +19,7 @@ from tankcal.pipeline.checks.size import (
     is_size_declared,
     nominal_radius_m,
 )
+from tankcal.pipeline.checks.survey import limit_at, limits_of
 from tankcal.pipeline.read_wall import FORMER
 from tankcal.pipeline.taped_wall import course_apart, exchanged_courses
 

@@ -1,7 +1,6 @@
 """Table of tangents: sights to the limbs of a tank from set-ups of a traverse round it."""
 
-from tankcal.job.fields import Field
-from tankcal.job.shared_columns import USE, angle_fields
+from tankcal.job.fields import USE, Field, angle_fields
 
 TANGENTS = (
     Field("setup", "name", "set-up of setups.csv", required=True),

@@ -6,13 +6,13 @@ from scipy.stats import norm
 from tankcal.errors import Problem
 from tankcal.geometry.shell import course_of
 from tankcal.messages import message
-from tankcal.pipeline.checks.instruments import limits_of
 from tankcal.pipeline.checks.moved_setups import (
     TANGENT_LIMITS,
     judge_tangents,
     least_tangents,
     worst_setup,
 )
+from tankcal.pipeline.checks.survey import limits_of
 from tankcal.pipeline.checks.wall import (
     check_nominal,
     check_size_told,

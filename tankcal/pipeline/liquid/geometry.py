@@ -24,7 +24,7 @@ import numpy as np
 
 from tankcal.job.model import DeclaredInput
 from tankcal.messages import message
-from tankcal.pipeline.checks.instruments import limits_of_method
+from tankcal.pipeline.checks.survey import limits_of_method
 from tankcal.pipeline.read_wall import (
     ReadWall,
     WallReading,

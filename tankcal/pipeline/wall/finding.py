@@ -20,8 +20,8 @@ from tankcal.methods.base import (
     given_methods,
     is_sighted,
 )
-from tankcal.pipeline.checks.instruments import limits_of
 from tankcal.pipeline.checks.survey import (
+    limits_of,
     noise_is_estimated,
     origin_of,
     warn_of_vague_points,

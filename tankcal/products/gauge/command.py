@@ -50,7 +50,7 @@ def _gauge(options):
     prepare_for_small_work()
     speak(options.language)
     if options.new:
-        from tankcal.products.gauge.starter import write_starter
+        from tankcal.products.gauge.reading import write_starter
 
         print_paths(options.folder, write_starter(options.folder, language_of_run()))
         return

@@ -13,10 +13,9 @@ from tankcal.pipeline.wall.finding import warnings_of
 from tankcal.pipeline.wall.surveyed import Wall
 from tankcal.products.inspection.rules import Strength
 from tankcal.products.inspection.shape import Sizes
-from tankcal.record.making import JobAsRead
+from tankcal.record.making import JobAsRead, shape_record
 from tankcal.record.schema import fill_from, to_plain
 from tankcal.record.texts import warnings_of as records_of
-from tankcal.record.wall_shape import shape_record
 
 RECORD = "record.json"  # file name of the record in a folder of results
 # Attribute of a job or key of a record, and the code of the method in `InspectedTank`.

@@ -17,7 +17,7 @@ from tankcal.job.tables import Log, read_bytes
 from tankcal.messages import message
 from tankcal.products.quantity.chain import QUANTITIES, Gauging, Product, follow_chain
 from tankcal.products.quantity.factor_table import read_factor_table
-from tankcal.products.quantity.slips import find_slips
+from tankcal.products.quantity.results import find_slips
 from tankcal.products.quantity.transfer import STATES, Transfer
 from tankcal.products.settings import fill_blanks, read_sections
 from tankcal.record.manifest import digest_of

@@ -11,10 +11,9 @@ import numpy as np
 
 from tankcal.job.checking import RELATIVE_DENSITY, missing_beside, refuse_repeated
 from tankcal.job.contract.courses import COLUMNS, SMALLEST_THICKNESS_MM, no_courses
-from tankcal.job.contract.kinds import KINDS
 from tankcal.job.contract.roof import KEYS as ROOF
 from tankcal.job.contract.roof import upside_down
-from tankcal.job.contract.shorthand import choice, number, positive
+from tankcal.job.contract.shorthand import KINDS, choice, number, positive
 from tankcal.job.entries import read_columns, read_section, unknown_section
 from tankcal.job.fields import Field, is_blank
 from tankcal.job.folder import MAX_SETTINGS_BYTES, read_csv, read_toml

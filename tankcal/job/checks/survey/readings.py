@@ -10,7 +10,7 @@ from tankcal.job.checks.survey.doubtful import refuse_packed
 from tankcal.job.checks.survey.files import tell_rows
 from tankcal.job.checks.survey.instruments import TAKEN_FROM_SETUPS
 from tankcal.job.contract.observations import ANGLES, READINGS
-from tankcal.job.shared_columns import ANGLE_UNITS
+from tankcal.job.fields import ANGLE_UNITS
 from tankcal.messages import join_with_or, list_some, message
 
 # correlated_readings.csv: unique pairs of two different existing values.

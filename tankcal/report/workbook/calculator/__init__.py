@@ -5,7 +5,7 @@ also computes the dip of a volume, and a delivery between two dips with its U. I
 table is refused with a message.
 """
 
-from tankcal.report.workbook.calculator.factor import factor_sheet
 from tankcal.report.workbook.calculator.form import calculator_sheets
+from tankcal.report.workbook.calculator.table import factor_sheet
 
 __all__ = ["calculator_sheets", "factor_sheet"]

@@ -1,6 +1,7 @@
 """Data of a record for the calculator, and its initial dips."""
 
 import math
+from collections import Counter
 from functools import cached_property
 from itertools import pairwise
 
@@ -8,7 +9,9 @@ from tankcal.record.covariance_factor import factor_of
 from tankcal.report.uncertainty.sources import critical_zone, groups_of
 from tankcal.report.uncertainty.stated import k_of_rows, stated_U_m3
 from tankcal.report.workbook.capacity import digits_of_heights
+from tankcal.report.workbook.look import Column, height_digits
 from tankcal.text.digits import decimals_of_rows
+from tankcal.text.words import name_of_input
 from tankcal.uncertainty import coverage_factor
 
 _FINER_DELIVERY = 2  # additional decimals of a delivery, whose U may be smaller than U of any row
@@ -68,3 +71,41 @@ class Table:
         """Return k for infinite and for `dof` degrees of freedom at the probability of the job."""
         probability = self.job["table"]["coverage_probability"]
         return tuple(float(k) for k in coverage_factor(probability, [math.inf, dof]))
+
+
+# ---- covariance factor
+
+_DIGITS = 6  # decimals of the factor in m³
+_WIDTH = 15  # width of a column, letters
+
+
+def column_names(book, capacity):
+    """Return the heading of each column: the input, numbered if it has several columns."""
+    kinds = capacity["input_kind"]
+    counts, numbers, names = Counter(kinds), Counter(), []
+    for kind in kinds:
+        numbers[kind] += 1
+        name = name_of_input(book.words, kind)
+        names.append(name if counts[kind] == 1 else f"{name} {numbers[kind]}")
+    return names
+
+
+def factor_sheet(book, record):
+    """Write dips in m and the columns of the factor in m³; no sheet without uncertain inputs.
+
+    The covariance of two rows is the sum over the columns of the products of their factors.
+    """
+    capacity = record["capacity"]
+    if not capacity["inputs"]:
+        return
+    heights = capacity["height_m"]
+    columns = [
+        Column(book.word("columns.dip_m", of="calculator"), heights, height_digits(heights), 12)
+    ]
+    factor_columns = factor_of(capacity).T
+    columns += [
+        Column(name, cells.tolist(), _DIGITS, _WIDTH)
+        for name, cells in zip(column_names(book, capacity), factor_columns, strict=True)
+    ]
+    sheet = book.plain_sheet("covariance_factor", columns, landscape=True)
+    book.name("covariance_factor", sheet, 1, len(heights), 1, len(columns) - 1)
