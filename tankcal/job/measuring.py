@@ -4,7 +4,7 @@ import numpy as np
 
 from tankcal.errors import SHEET
 from tankcal.job.cameras import AXES, datum_point, make_camera
-from tankcal.job.checks.survey.stadia import bars_of, bars_used, is_bar
+from tankcal.job.checks.survey.readings import bars_of, bars_used, is_bar
 from tankcal.job.contract.observations import ANGLES, READINGS
 from tankcal.job.contract.registers import FREE, INSTRUMENT_KINDS
 from tankcal.job.imagery import imagery_of

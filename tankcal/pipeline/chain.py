@@ -14,8 +14,7 @@ from tankcal.methods.base import supplement_of
 from tankcal.pipeline.checks.survey import incomplete_certificate, open_questions
 from tankcal.pipeline.overruling_effects import effect_of, warn_of_overrulings
 from tankcal.pipeline.result import Result
-from tankcal.pipeline.simulation import gum_intervals, simulate_table
-from tankcal.pipeline.simulation.table import SIMULATING
+from tankcal.pipeline.simulation import SIMULATING, gum_intervals, simulate_table
 from tankcal.pipeline.statements import pairs_to_simulate, statements, verdict_of
 from tankcal.pipeline.surveying import adjust_decided, find_survey, placed
 from tankcal.pipeline.table import check_table, compute_table

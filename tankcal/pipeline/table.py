@@ -13,7 +13,7 @@ from tankcal.methods.base import accompanying_methods, given_methods, method_of
 from tankcal.pipeline.checks.size import check_mesh, check_scan, check_size, check_wall
 from tankcal.pipeline.checks.survey import against_nominal, warn_of_undeclared
 from tankcal.pipeline.tanks import body_of, critical_zone, zero_height
-from tankcal.solver.threads import threads_for
+from tankcal.solver.compiled import threads_for
 from tankcal.tank.body import Body
 from tankcal.tank.capacity import Capacity, refuse_falling
 from tankcal.tank.dips import (

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from tankcal.job.checking import has_rows
-from tankcal.job.checks.survey.stadia import bars_used
+from tankcal.job.checks.survey.readings import bars_used
 from tankcal.planning.model import Base
 from tankcal.quadrature import panels
 from tankcal.survey.measurements import Readings

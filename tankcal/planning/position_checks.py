@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.job.checking import has_rows, is_not_given, tell
-from tankcal.job.checks.survey.stadia import refuse_itself
+from tankcal.job.checks.survey.readings import refuse_itself
 from tankcal.job.contract.registers import LEAST
 from tankcal.job.tables import Log, nearest
 from tankcal.messages import join_with_and, list_some, message

@@ -15,8 +15,7 @@ from tankcal.job.checks import check_tank
 from tankcal.job.checks.survey.cameras import check_cameras
 from tankcal.job.checks.survey.doubtful import TINY
 from tankcal.job.checks.survey.files import SurveyFiles
-from tankcal.job.checks.survey.instruments import check_instruments
-from tankcal.job.checks.survey.stadia import bars_of, check_bars
+from tankcal.job.checks.survey.readings import bars_of, check_bars, check_instruments
 from tankcal.job.contract import KEYS
 from tankcal.job.entries import (
     ColumnValues,

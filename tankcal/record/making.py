@@ -12,8 +12,7 @@ from math import degrees
 import numpy as np
 import scipy
 
-from tankcal.job.model import InputFile
-from tankcal.job.model.parts import Course, Deadwood
+from tankcal.job.model import Course, Deadwood, InputFile
 from tankcal.job.model.settings import (
     Datum,
     Equipment,

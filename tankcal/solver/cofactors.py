@@ -7,7 +7,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse
 
-from tankcal.solver.compiled import is_worth_compiling
+from tankcal.solver.compiled import is_worth_compiling, threads_for
 from tankcal.solver.elimination import (
     add_own_cofactors,
     block_cofactors,
@@ -18,7 +18,6 @@ from tankcal.solver.elimination import (
     through_reduced,
 )
 from tankcal.solver.propagate import propagate_cofactors
-from tankcal.solver.threads import threads_for
 
 DENSE = 4e6  # elements up to which the back substitution is stored as a dense matrix
 

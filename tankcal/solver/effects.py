@@ -13,9 +13,9 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse
 
+from tankcal.solver.compiled import threads_for
 from tankcal.solver.elimination import leverage
 from tankcal.solver.model import s_transform
-from tankcal.solver.threads import threads_for
 
 UNTESTED = 1e-10  # relative variance of a reaction below which only rounding remains
 AT_ONCE = 4e6  # elements of a dense matrix processed at a time

@@ -55,7 +55,7 @@ from tankcal.survey.results import (
     Readings,
     causes_of,
 )
-from tankcal.survey.start.unstarted import SeveralPlacesError
+from tankcal.survey.start.single_points import SeveralPlacesError
 from tankcal.survey.start_values import add_start_values, mirrored_targets, start_like
 
 SUSPICIOUS = 4.0  # sigma0 above which whole files are suspected

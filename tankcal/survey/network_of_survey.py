@@ -9,7 +9,6 @@ from scipy.sparse.csgraph import connected_components
 from tankcal.errors import InputError, Problem
 from tankcal.messages import join_with_and, list_some, message
 from tankcal.survey.diagnosis.double_names import image_point_label
-from tankcal.survey.means import average_repeated, reject_scattered
 from tankcal.survey.network import Instrument, Survey, System
 from tankcal.survey.network.assembly import one_ray_sentence
 from tankcal.survey.observations import (
@@ -21,7 +20,13 @@ from tankcal.survey.observations import (
     SystemCoordinates,
 )
 from tankcal.survey.photographs import gathered_photos, orientation_of
-from tankcal.survey.readings import Numbers, bend_per_m, observations_of_readings
+from tankcal.survey.readings import (
+    Numbers,
+    average_repeated,
+    bend_per_m,
+    observations_of_readings,
+    reject_scattered,
+)
 
 AXES = "xyz"
 TOLD = 10  # warnings listed singly; further omitted points are only counted

@@ -32,11 +32,11 @@ from tankcal.survey.start.pieces import BAD_JOINT, certain_places, hinted_places
 from tankcal.survey.start.plan import medians, plan_of
 from tankcal.survey.start.plan_frames import find_plan_positions
 from tankcal.survey.start.polar import orient_circles
-from tankcal.survey.start.single_points import sought_point
-from tankcal.survey.start.unstarted import (
+from tankcal.survey.start.single_points import (
     LISTED,
     loose_frame_sentence,
     refuse_missing,
+    sought_point,
     unfixed_point_error,
 )
 

@@ -26,7 +26,7 @@ from tankcal.geometry.field.places import OF_CYLINDERS, OF_GREAT_CIRCLES, OF_SPH
 from tankcal.job import plausibility
 from tankcal.job.checks import settings, tapes
 from tankcal.job.checks.settings import MAX_TABLE_ROWS
-from tankcal.job.checks.survey import instruments
+from tankcal.job.checks.survey import readings as survey_checks
 from tankcal.job.contract import registers
 from tankcal.methods.clouds import bottom as clouds_bottom
 from tankcal.methods.clouds import overlaps
@@ -43,9 +43,9 @@ from tankcal.methods.liquid import tables as liquid_facts
 from tankcal.methods.strapping import tape_warnings
 from tankcal.pipeline import cluster, scanned_solids
 from tankcal.pipeline import overruling_effects as overruling
+from tankcal.pipeline import simulation as simulation_model
 from tankcal.pipeline.checks import wall as wall_checks
 from tankcal.pipeline.liquid import adjustment as liquid_steps
-from tankcal.pipeline.simulation import table as simulation_model
 from tankcal.pipeline.wall_straps import typical_shape_m
 from tankcal.products.fieldbooks import lists
 from tankcal.products.gauge import deviation
@@ -68,7 +68,7 @@ from tankcal.report import attachments, letterhead
 from tankcal.report.inspection import paper as inspection_paper
 from tankcal.report.survey import quality
 from tankcal.report.web import calculator_data
-from tankcal.survey import means, strapping, untied
+from tankcal.survey import poses, readings, strapping
 from tankcal.survey.diagnosis import blunders as wrong_readings
 from tankcal.tank import gauging
 from tankcal.tank.liquid import adjustment as liquid_adjustment
@@ -266,7 +266,7 @@ LIMITS = [
     (
         "docs/wall-hits.md",
         "a `correction` of over () ppm",
-        [PPM * instruments.DOUBTFUL_CORRECTION],
+        [PPM * survey_checks.DOUBTFUL_CORRECTION],
     ),
     (
         "docs/studies/wall-hits.md",
@@ -296,7 +296,7 @@ LIMITS = [
     (
         "docs/studies/wall-hits.md",
         "if the other order fits () or () times better",
-        [untied.MIRRORED, untied.EXCHANGED],
+        [poses.MIRRORED, poses.EXCHANGED],
     ),
     (
         "docs/tangents.md",
@@ -901,7 +901,7 @@ LIMITS += [
         [PERCENT * wrong_readings.MANY, PERCENT * wrong_readings.LEVEL],
     ),
     ("docs/studies/adjustment.md", "agrees without them (both at () %", [PERCENT * adjust.ALPHA]),
-    ("docs/studies/adjustment.md", "contradict each other beyond () %", [PERCENT * means.LEVEL]),
+    ("docs/studies/adjustment.md", "contradict each other beyond () %", [PERCENT * readings.LEVEL]),
     (
         "docs/adjustment.md",
         "(factor √χ²(3): (), (), () for 90, 95, 99 %; the standard ellipsoid holds () %)",

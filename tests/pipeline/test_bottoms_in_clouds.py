@@ -21,7 +21,7 @@ from tankcal.clouds.inside import bottom_points
 from tankcal.clouds.inside.bottom import find_bottom_in_cells
 from tankcal.clouds.inside.floor_cells import FloorCells, floor_grid
 from tankcal.clouds.wall.start import CylinderSurface
-from tankcal.job.model.parts import Bottom
+from tankcal.job.model import Bottom
 from tankcal.methods.clouds.bottom import CloudInside, with_bottom
 from tankcal.record import record_of
 from tankcal.record.schema import check_data

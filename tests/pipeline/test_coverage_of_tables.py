@@ -29,7 +29,7 @@ from simulated_tanks import (
 
 import tankcal
 from tankcal.gum.monte_carlo import QuadraticRows, simulate, verdict
-from tankcal.pipeline.simulation.table import coordinates
+from tankcal.pipeline.simulation import coordinates
 from tankcal.tank.deliveries import deliveries
 
 pytestmark = pytest.mark.slow

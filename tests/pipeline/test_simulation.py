@@ -16,9 +16,8 @@ from tankcal.gum import Combination
 from tankcal.gum.distributions import standard
 from tankcal.gum.monte_carlo import Goal
 from tankcal.job.model import DeclaredInput
-from tankcal.pipeline.simulation import simulate_table
+from tankcal.pipeline.simulation import Model, simulate_table
 from tankcal.pipeline.simulation.curvature import VARIED, curvature, vary_input
-from tankcal.pipeline.simulation.table import Model
 from tankcal.pipeline.tanks import body_of
 from tankcal.tank.budgets import budget
 from tankcal.uncertainty import declared_source
@@ -397,7 +396,7 @@ def test_rows_not_drawn_follow_their_neighbours(monkeypatch, tmp_path):
     rows = [("scale", 100, "ppm"), ("datum", 2.0, "mm"), ("offset", 0.5, "mm", "A", "normal", 4)]
     result = run(tmp_path / "job", uncertainty=rows, sd_mm=1.0, settings={"table.step_m": 0.005})
     some = simulated(result, [(1.0, 4.0)])
-    monkeypatch.setattr("tankcal.pipeline.simulation.table.MOST_ROWS", 10**6)
+    monkeypatch.setattr("tankcal.pipeline.simulation.MOST_ROWS", 10**6)
     every = simulated(result, [(1.0, 4.0)])
     assert len(every.found.low) > 2 * 800
     for name in ("value", "low", "high", "shortest_low", "shortest_high"):
@@ -423,7 +422,7 @@ def test_rows_that_take_plain_draws_are_bounded_in_number(monkeypatch, tmp_path,
     (folder / "job.toml").write_text(text, "utf-8")
     result = tankcal.run(tankcal.load(folder), simulated=False)
     some = simulated(result, plain_draws=100_000)
-    monkeypatch.setattr("tankcal.pipeline.simulation.table.MOST_PLAIN", 10**6)
+    monkeypatch.setattr("tankcal.pipeline.simulation.MOST_PLAIN", 10**6)
     every = simulated(result, plain_draws=100_000)
     assert every.drawn > some.drawn + 5
     off = 0.0

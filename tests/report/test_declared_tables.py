@@ -20,7 +20,7 @@ from tankcal.report.tables import Column, capacity, survey, tank
 from tankcal.report.uncertainty import budget, method, monte_carlo, rule, stated
 from tankcal.report.web import page
 from tankcal.report.workbook.book import Book
-from tankcal.report.workbook.tables import columns_of
+from tankcal.report.workbook.sections import columns_of
 from tankcal.text.digits import decimals_of
 from tankcal.text.words import load_words
 

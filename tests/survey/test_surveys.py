@@ -12,12 +12,11 @@ from surveyed import by_instruments, by_photographs, changed, known, places, tab
 
 from tankcal.errors import InputError, SolutionError
 from tankcal.survey import adjust_survey, wall_points
-from tankcal.survey.means import average_readings
 from tankcal.survey.measurements import AdjustmentSettings, Instrument, Measurements, Targets
 from tankcal.survey.network import adjust
 from tankcal.survey.observations import ImageCoordinates
 from tankcal.survey.points import move_to_wall
-from tankcal.survey.readings import EARTH_RADIUS_M, true_distance_m
+from tankcal.survey.readings import EARTH_RADIUS_M, average_readings, true_distance_m
 
 
 @pytest.fixture(scope="module")

@@ -12,12 +12,12 @@ from tankcal.errors import SolutionError
 from tankcal.record.adjustment import adjustment_of
 from tankcal.record.schema import to_plain
 from tankcal.survey import adjust_survey
-from tankcal.survey.means import average_readings, contradictory_labels
 from tankcal.survey.measurements import Measurements
 from tankcal.survey.network import adjust
 from tankcal.survey.network.reliability import HELD, reactions
 from tankcal.survey.network.separability import alternatives
 from tankcal.survey.network.snooping import set_use
+from tankcal.survey.readings import average_readings, contradictory_labels
 
 TRUTH = by_photographs(photos=6)[1].xyz_m, by_instruments()[1].xyz_m
 

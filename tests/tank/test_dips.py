@@ -12,6 +12,9 @@ from scipy.optimize import brentq
 from tankcal.errors import HeightError, InputError
 from tankcal.tank.dips import (
     HEIGHT_STEPS_M,
+    INCH_STEPS_M,
+    LADDERS_M,
+    METRIC_STEPS_M,
     VOLUME_UNITS_M3,
     choose_rows,
     dip_label,
@@ -26,7 +29,6 @@ from tankcal.tank.dips import (
     volume_from_m3,
     volume_to_m3,
 )
-from tankcal.tank.dips.straightness import INCH_STEPS_M, LADDERS_M, METRIC_STEPS_M
 
 RADIUS_M, LENGTH_M = 1.2, 10.0
 

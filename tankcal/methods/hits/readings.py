@@ -7,8 +7,7 @@ import numpy as np
 from tankcal.job.checking import has_rows, refuse_repeated, tell_missing
 from tankcal.job.checks.extent import has_survey, tells_by_tape
 from tankcal.job.checks.survey.files import SurveyFiles, refuse_undefined
-from tankcal.job.checks.survey.instruments import check_correction
-from tankcal.job.checks.survey.readings import check_angle, warn_copies
+from tankcal.job.checks.survey.readings import check_angle, check_correction, warn_copies
 from tankcal.job.checks.tapes import refuse_others, tapes_of
 from tankcal.job.contract.registers import FREE, USUAL_INCIDENCE_MM
 from tankcal.job.measuring import angle_in_rad, setups_of

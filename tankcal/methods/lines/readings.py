@@ -4,7 +4,7 @@ import numpy as np
 
 from tankcal.job.checking import has_rows, refuse_repeated, tell_missing
 from tankcal.job.checks.extent import has_wall_points, is_strapped
-from tankcal.job.checks.survey.stadia import is_bar
+from tankcal.job.checks.survey.readings import is_bar
 from tankcal.job.checks.tapes import (
     check_levels,
     names_of,

@@ -17,7 +17,7 @@ from tankcal.job.checks.tapes import (
     tell_without_effect,
 )
 from tankcal.job.contract.courses import SMALLEST_THICKNESS_MM, thin_plate
-from tankcal.job.model.parts import Ring
+from tankcal.job.model import Ring
 from tankcal.job.plausibility import IMPOSSIBLE_MISS
 from tankcal.job.structure import structure
 from tankcal.job.tapes import gauged

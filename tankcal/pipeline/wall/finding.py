@@ -55,7 +55,7 @@ from tankcal.sections import (
     own_covariances,
     sample_of,
 )
-from tankcal.solver.threads import threads_for
+from tankcal.solver.compiled import threads_for
 from tankcal.units import FULL_TURN
 
 

@@ -7,7 +7,7 @@ from tankcal.geometry.field.amplitudes import assumed_amplitudes
 from tankcal.job.building import job_of
 from tankcal.job.checking import zero_z
 from tankcal.job.checks.extent import volume_by_sizes
-from tankcal.job.checks.survey.stadia import is_bar
+from tankcal.job.checks.survey.readings import is_bar
 from tankcal.job.tables import SETTINGS_FILE, Log, Value
 from tankcal.planning.contract import MEASURING, PLAN_FILE, forms_m
 from tankcal.planning.visibility import obstacles_of

@@ -14,8 +14,14 @@ from tankcal.report.tables.capacity import (
 from tankcal.report.uncertainty.sources import critical_zone
 from tankcal.report.uncertainty.stated import stated_U_m3
 from tankcal.report.workbook.look import CRITICAL, Column, width_of, width_of_lines
-from tankcal.report.workbook.sections import HEAD_ROW, SheetContent, cell_table, write_sheet
-from tankcal.report.workbook.tables import columns_of, set_widths
+from tankcal.report.workbook.sections import (
+    HEAD_ROW,
+    SheetContent,
+    cell_table,
+    columns_of,
+    set_widths,
+    write_sheet,
+)
 from tankcal.text.digits import (
     LITRE_DECIMALS,
     decimals_of_height,

@@ -13,9 +13,9 @@ from tankcal.report.workbook.sections import (
     CellTable,
     SheetContent,
     cell_table,
+    columns_of,
     write_sheet,
 )
-from tankcal.report.workbook.tables import columns_of
 from tankcal.text.digits import decimals_of
 
 _INSIDE_WIDTHS = (50, 16, 16, 16, 16)  # widths of the columns of the sheet inside, letters

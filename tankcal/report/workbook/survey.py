@@ -21,9 +21,10 @@ from tankcal.report.workbook.sections import (
     Sentences,
     SheetContent,
     cell_table,
+    columns_of,
+    set_widths,
     write_sheet,
 )
-from tankcal.report.workbook.tables import columns_of, set_widths
 from tankcal.text.digits import decimals_of
 from tankcal.text.words import (
     datum_sentences,

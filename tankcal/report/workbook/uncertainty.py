@@ -11,9 +11,10 @@ from tankcal.report.workbook.sections import (
     Sentences,
     SheetContent,
     cell_table,
+    columns_of,
+    set_widths,
     write_sheet,
 )
-from tankcal.report.workbook.tables import columns_of, set_widths
 from tankcal.text.digits import decimals_of
 
 _RULE_FACTS = (40, 16, 16, 16, 16, 16)  # widths of the columns of the facts of a rule

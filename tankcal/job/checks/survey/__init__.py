@@ -11,9 +11,12 @@ from tankcal.job.checks.survey.datum import check_datum, check_held, check_known
 from tankcal.job.checks.survey.doubtful import check_doubtful
 from tankcal.job.checks.survey.files import SurveyFiles, check_names
 from tankcal.job.checks.survey.images import check_images
-from tankcal.job.checks.survey.instruments import check_instruments
-from tankcal.job.checks.survey.readings import check_correlated, check_readings
-from tankcal.job.checks.survey.stadia import check_stadia
+from tankcal.job.checks.survey.readings import (
+    check_correlated,
+    check_instruments,
+    check_readings,
+    check_stadia,
+)
 from tankcal.job.contract import KEYS
 from tankcal.job.tables import SURVEY_TABLES
 from tankcal.messages import message

@@ -5,11 +5,11 @@ import math
 import numpy as np
 
 from tankcal.errors import SHEET
-from tankcal.job.checking import has_rows
+from tankcal.job.checking import has_rows, refuse_repeated, tell_missing, temperature_missing
 from tankcal.job.checks.survey.doubtful import refuse_packed
-from tankcal.job.checks.survey.files import tell_rows
-from tankcal.job.checks.survey.instruments import TAKEN_FROM_SETUPS
+from tankcal.job.checks.survey.files import refuse_undefined, tell_rows
 from tankcal.job.contract.observations import ANGLES, READINGS
+from tankcal.job.contract.registers import KIND
 from tankcal.job.fields import ANGLE_UNITS
 from tankcal.messages import join_with_or, list_some, message
 
@@ -292,3 +292,161 @@ def _warn_single_directions(files, table):
                 where=set_name,
             )
             files.log.warning(table.file, expected, next(iter(rows_of_targets.values())), "to")
+
+
+# ---- instruments
+
+DOUBTFUL_CORRECTION = 5e-4  # largest plausible scale correction
+TAKEN_FROM_SETUPS = ("slope_distances", "directions", "zenith_angles")
+
+
+def check_instruments(files):
+    """Check instruments, unique set-ups, and references to them."""
+    for name, given in files.registers["instruments"].items():
+        _check_instrument(files, name, given)
+    setups, instruments = files.tables["setups"], files.registers["instruments"]
+    if setups is not None:
+        refuse_repeated(setups, "setup", files.log)
+        refuse_undefined(files, setups, "instrument", instruments, "instruments")
+    defined = () if setups is None else dict.fromkeys(setups.of("setup"))
+    for table in TAKEN_FROM_SETUPS:
+        if has_rows(files.tables[table]):
+            refuse_undefined(files, files.tables[table], "setup", defined, "setups")
+    distances = files.tables["distances"]
+    if has_rows(distances):
+        refuse_undefined(files, distances, "instrument", instruments, "instruments")
+        _check_temperatures(files, distances, instruments)
+
+
+def check_correction(files, name, given):
+    """Warn about an implausible scale correction, such as a percentage or millimetres."""
+    correction = given["correction"]
+    if correction is not None and abs(correction) > DOUBTFUL_CORRECTION:
+        expected = message(
+            "large_correction",
+            "found {correction:g}, {ppm:.0f} ppm; expected a small ratio, such as 0.0001",
+            correction=correction,
+            ppm=1e6 * correction,
+        )
+        files.tell_key(files.log.warning, "instruments", name, "correction", expected)
+
+
+def _check_instrument(files, name, given):
+    check_correction(files, name, given)
+    if given["expansion_per_k"] and not files.is_given(
+        "instruments", name, "certified_temperature_c"
+    ):
+        key = "certified_temperature_c"
+        files.tell_key(files.log.problem, "instruments", name, key, temperature_missing())
+
+
+def _check_temperatures(files, distances, instruments):
+    """Warn about missing and ineffective temperatures of tape readings."""
+    temperature = distances.numbers("temperature_c")
+    expands = np.array(
+        [
+            bool((instruments.get(name) or {}).get("expansion_per_k"))
+            for name in distances.of("instrument")
+        ],
+        dtype=bool,
+    )
+    is_missing = expands & np.isnan(temperature)
+    is_ineffective = ~expands & ~np.isnan(temperature) & files.sound(distances)
+    for is_reported, expected in (
+        (
+            is_missing,
+            message(
+                "tape_without_temperature",
+                "blank in {rows} rows of a tape with expansion_per_k; they are not corrected",
+                rows=int(is_missing.sum()),
+            ),
+        ),
+        (
+            is_ineffective,
+            message(
+                "temperature_idle",
+                "without effect in {rows} rows: the instrument has no expansion_per_k",
+                rows=int(is_ineffective.sum()),
+            ),
+        ),
+    ):
+        if is_reported.any():
+            row = distances.rows[int(np.argmax(is_reported))]
+            files.log.warning(distances.file, expected, row, "temperature_c")
+
+
+# ---- stadia
+
+
+def bars_of(registers):
+    """{name: {key: value}} of the stadia bars of instruments.toml."""
+    instruments = registers["instruments"]
+    return {name: keys for name, keys in instruments.items() if is_bar(keys["kind"])}
+
+
+def is_bar(kind):
+    """Return True for the kind of a stadia bar, in any spelling."""
+    return (kind or "").strip().lower() == KIND
+
+
+def bars_used(table, bars):
+    """Bar of each reading, shape (n,); blank: the only bar; None: several bars."""
+    only = next(iter(bars)) if len(bars) == 1 else None
+    return [only if name is None else name for name in table.of("bar")]
+
+
+def check_bars(files, table):
+    """Check the stadia bars of instruments.toml, and the references of readings to them."""
+    bars = bars_of(files.registers)
+    for name, given in bars.items():
+        for key in ("length_m", "u_mm"):
+            if given[key] is None:
+                expected = message(
+                    "bar_not_described",
+                    "missing; expected it of a stadia: distances are read against its length",
+                )
+                files.tell_key(files.log.problem, "instruments", name, key, expected)
+    if files.raw.registers.get("instruments", 0) is None:  # unreadable, reported already
+        return
+    if not files.registers["instruments"]:
+        tell_missing(files.log, files.raw.file_of("instruments"), table.file, "bar")
+        return
+    reported = set()
+    for row, bar in zip(table.rows, bars_used(table, bars), strict=True):
+        if bar not in bars and bar not in reported:
+            reported.add(bar)
+            expected = message(
+                "no_such_bar",
+                "found {name!r}; expected a stadia of {file}: kind = stadia, length_m, u_mm",
+                name=bar or "",
+                file=files.raw.file_of("instruments"),
+            )
+            files.log.problem(table.file, expected, row, "bar")
+
+
+def check_stadia(files):
+    """Check all stadia readings and their bars."""
+    table = files.tables["stadia"]
+    if not has_rows(table):
+        return
+    setups = files.tables["setups"]
+    defined = () if setups is None else dict.fromkeys(setups.of("setup"))
+    refuse_undefined(files, table, "setup", defined, "setups")
+    check_angle(files, table, "angle")
+    check_bars(files, table)
+    stations = {}
+    if setups is not None:
+        stations = dict(zip(setups.of("setup"), setups.of("station"), strict=True))
+    for row, setup, to in zip(table.rows, table.of("setup"), table.of("to"), strict=True):
+        if to is not None and stations.get(setup) == to:
+            refuse_itself(files.log, table, row, to)
+
+
+def refuse_itself(log, table, row, to):
+    """Report a bar on the station of its own set-up."""
+    expected = message(
+        "stadia_at_itself",
+        "found station {to!r} of the set-up itself; expected another one",
+        to=to,
+    )
+    log.problem(table.file, expected, row, "to")

@@ -3,7 +3,7 @@
 The first sentences concern valid input; all others begin with the word for "refused".
 """
 
-from tankcal.report.workbook.calculator import products
+from tankcal.report.workbook.calculator import service
 from tankcal.report.workbook.calculator.service import SHELL_C
 from tankcal.text.digits import fixed, shortest
 from tankcal.text.words import marks_of
@@ -41,8 +41,8 @@ def sentences(book, table):
         "light": shortest(min(table.densities), marks),
         "heavy": shortest(max(table.densities), marks),
         "own": shortest(table.densities[0], marks),
-        "cold": shortest(products.LEAST_C, marks),
-        "hot": shortest(products.MOST_C, marks),
+        "cold": shortest(service.LEAST_C, marks),
+        "hot": shortest(service.MOST_C, marks),
         "shell_cold": shortest(SHELL_C[0], marks),
         "shell_hot": shortest(SHELL_C[1], marks),
         "temperature": shortest(table.job["table"]["reference_temperature_c"], marks),

@@ -12,7 +12,7 @@ from tankcal.report.workbook.calculator.sentences import refused_word
 from tankcal.report.workbook.calculator.table import Table
 from tankcal.report.workbook.look import ACCENT, INPUT, LINE_PT, MUTED, number_format
 from tankcal.report.workbook.quantity import correction, gauging, uncertainty
-from tankcal.report.workbook.quantity.rows import NONE, STATES
+from tankcal.report.workbook.quantity.correction import NONE, STATES
 from tankcal.tank.gauging import FIELDS_OF_U, UNCERTAINTIES, UNITS_OF_U
 from tankcal.text.digits import NOTHING, fixed, shortest
 from tankcal.text.words import marks_of

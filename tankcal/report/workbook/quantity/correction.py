@@ -12,22 +12,22 @@ at t, or for the density at the base. VCF = exp(L(t) - L(base)), and
 
     dln rho_base / dln rho = (1 + L'(base)) / (1 + L'(sample)),   L' = dL / dln r
     dVCF / dln rho = VCF (L'(t) - L'(base)) / (1 + L'(sample))
+
+Rows of the hidden sheet of workings, and the notation of their formulas.
+
+In the texts of formulas, `[tov_c]` denotes the cell of a key, `[tov@]` the cell of the opening
+(`[tov_o]`) or of the closing (`[tov_c]`), and `#fine` the number of a sentence.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from tankcal.report.workbook.calculator.cells import is_no_number
-from tankcal.report.workbook.quantity.rows import (
-    NONE,
-    cell_row,
-    choice_code,
-    fault,
-    first_true,
-    state_row,
-)
 from tankcal.tank.gauging import LIMITS
 from tankcal.tank.volume_correction import brazil, petroleum
 from tankcal.tank.volume_correction.corrections import LEAST_C, MOST_C
+from tankcal.text.digits import NOTHING
 
 # Codes of the volume corrections, in the order of their list; groups and bases likewise from 1.
 D1250_04, D1250_80, CNP, CNP_UNROUNDED, COEFFICIENT, TYPED = range(1, 7)
@@ -385,3 +385,62 @@ def factor_rows():
         state_row("vcf_r", "∂VCF/∂lnρ", _guard(
             f"IF({kind}<=2,{by_density},IF({kind}<={CNP_UNROUNDED},{by_density_cnp},0))", good)),
     ]  # fmt: skip
+
+
+# ---- rows of workings and their notation
+
+STATES = ("o", "c")  # opening and closing
+NONE = f'"{NOTHING}"'
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Cell with a formula and its result for a blank form."""
+
+    key: str
+    formula: str
+    result: float | str = NOTHING
+
+
+@dataclass(frozen=True)
+class Row:
+    """Row of the workings: symbol, cells from column B, and the key of a label after the symbol."""
+
+    symbol: str
+    cells: tuple[Cell, ...]
+    label: str = ""
+
+
+def cell_row(key, symbol, formula, result=NOTHING):
+    """Row with a common cell of both states."""
+    return Row(symbol, (Cell(key, formula, result),))
+
+
+def state_row(key, symbol, formula, result=NOTHING):
+    """Row with a cell for each state; the results may differ, as a pair."""
+    results = result if isinstance(result, tuple) else (result, result)
+    return Row(
+        symbol,
+        tuple(
+            Cell(f"{key}_{state}", formula.replace("@", f"_{state}"), value)
+            for state, value in zip(STATES, results, strict=True)
+        ),
+    )
+
+
+def first_true(cases, otherwise):
+    """Formula of the sentence of the first condition that is true; `cases` are pairs."""
+    formula = otherwise
+    for condition, sentence in reversed(cases):
+        formula = f"IF({condition},#{sentence},{formula})"
+    return formula
+
+
+def choice_code(cell, names):
+    """Formula of the place of a choice in a named list; 0: blank, -1: not in the list."""
+    return f"IF(ISBLANK({cell}),0,IF(ISNUMBER(MATCH({cell},{names},0)),MATCH({cell},{names},0),-1))"
+
+
+def fault(cell, low, high):
+    """Condition that a cell contains no number from `low` to `high`."""
+    return f"OR({is_no_number(cell)},{cell}<{low},{cell}>{high})"

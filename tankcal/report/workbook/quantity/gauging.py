@@ -3,8 +3,15 @@
 from dataclasses import replace
 
 from tankcal.report.uncertainty.sources import is_roof_in_table, roof_of
-from tankcal.report.workbook.quantity.correction import FACTORS, TYPED, factor_rows
-from tankcal.report.workbook.quantity.rows import NONE, fault, first_true, state_row
+from tankcal.report.workbook.quantity.correction import (
+    FACTORS,
+    NONE,
+    TYPED,
+    factor_rows,
+    fault,
+    first_true,
+    state_row,
+)
 from tankcal.tank.fittings import AIR_KG_M3, WEIGHTS_KG_M3
 from tankcal.tank.gauging import LIMITS
 

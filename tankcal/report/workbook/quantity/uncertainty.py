@@ -10,9 +10,16 @@ from itertools import pairwise
 
 from tankcal.report.uncertainty.sources import read_room_levels, roof_of
 from tankcal.report.workbook.calculator.coverage import normal, student
-from tankcal.report.workbook.quantity.correction import TYPED
+from tankcal.report.workbook.quantity.correction import (
+    NONE,
+    STATES,
+    TYPED,
+    Cell,
+    Row,
+    cell_row,
+    state_row,
+)
 from tankcal.report.workbook.quantity.gauging import interpolation_formulas
-from tankcal.report.workbook.quantity.rows import NONE, STATES, Cell, Row, cell_row, state_row
 from tankcal.tank.fittings import AIR_KG_M3, WEIGHTS_KG_M3
 from tankcal.tank.gauging import ROOMS, VCF_AT_K, VCF_K, VCF_PERCENT
 from tankcal.uncertainty import least_of
