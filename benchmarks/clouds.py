@@ -24,8 +24,8 @@ from measured import Row, tell
 
 from tankcal.clouds import describe_cloud
 from tankcal.clouds.wall import find_cloud_wall
+from tankcal.methods.clouds.passes import Placing, Reading, Telling, open_passes
 from tankcal.methods.clouds.readings import CloudFile
-from tankcal.pipeline.cloud_passes import Placing, Reading, Telling, open_passes
 from tankcal.survey.scans import ScanSetup
 from tankcal.survey.wall_hits import RangingInstrument
 

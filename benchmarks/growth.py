@@ -212,7 +212,7 @@ def cloud(folder, size):
     import clouds
 
     from tankcal.clouds.wall import find_cloud_wall
-    from tankcal.pipeline.cloud_passes import Placing, Reading, Telling, open_passes
+    from tankcal.methods.clouds.passes import Placing, Reading, Telling, open_passes
 
     path = folder / "wall.las"
     clouds.write_las(path, size)

@@ -28,11 +28,9 @@ from tankcal.clouds.wall.cells import SUMMED, CellGrid
 from tankcal.clouds.wall.start import CylinderSurface
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
+from tankcal.methods.clouds import passes as cloud_cluster
 from tankcal.methods.clouds import wall as cloud_wall
-from tankcal.methods.clouds.readings import CloudFile
-from tankcal.pipeline import cloud_passes as cloud_cluster
-from tankcal.pipeline import cluster
-from tankcal.pipeline.cloud_passes import (
+from tankcal.methods.clouds.passes import (
     ClusterPasses,
     JobPasses,
     Placing,
@@ -41,6 +39,8 @@ from tankcal.pipeline.cloud_passes import (
     Telling,
     open_passes,
 )
+from tankcal.methods.clouds.readings import CloudFile
+from tankcal.pipeline import cluster
 from tankcal.record import record_of
 from tankcal.survey.scans import ScanSetup
 from tankcal.survey.wall_hits import RangingInstrument
@@ -129,7 +129,7 @@ def test_workers_change_no_byte_of_the_inside(client, placing):  # invariance
 
 def test_chunks_change_no_byte(placing, monkeypatch):  # invariance: no rounding hangs on a number
     whole = JobPasses(placing)
-    from tankcal.pipeline import cloud_passes as cloud_passes
+    from tankcal.methods.clouds import passes as cloud_passes
 
     def by_few(*args, **settings):
         return tankcal.clouds.read_cloud(*args, chunk=501, **settings)

@@ -24,7 +24,7 @@ from page_figures import figures_of
 import tankcal
 from tankcal.errors import InputError, SolutionError
 from tankcal.geometry.field.sites import free_design
-from tankcal.pipeline.checks.moved_setups import critical_of_setup, judge_tangents
+from tankcal.methods.moved_setups import critical_of_setup, judge_tangents
 from tankcal.pipeline.wall.shared_unknowns import noise_of_wall
 from tankcal.survey.poses import poses_in_network
 

@@ -21,8 +21,7 @@ from tankcal.products.quantity.table import TankTable, read_table
 from tankcal.record.schema import to_plain
 from tankcal.report.letterhead import Letterhead
 from tankcal.report.ticket import TicketPaper, write_ticket
-from tankcal.report.ticket.booklet import BOOKLET
-from tankcal.report.ticket.pages import comparison_text
+from tankcal.report.ticket.pages import BOOKLET, comparison_text
 from tankcal.report.verification import verify
 from tankcal.tank.fittings import floating_roof
 from tankcal.text.shipped import LANGUAGES

@@ -68,8 +68,8 @@ class CloudsMethod(Method):
     # ---- pipeline
 
     def find(self, job, progress, network):
+        from tankcal.methods.clouds.passes import Reading
         from tankcal.methods.clouds.wall import find_wall_in_clouds
-        from tankcal.pipeline.cloud_passes import Reading
         from tankcal.pipeline.surveying import Surveyed
 
         reading = Reading(network.cluster, network.part_progress)

@@ -92,10 +92,10 @@ def save_hits(result):
     repeats = repeats_of(result.job.hits.control)
     certificates = {name: tool.certificate for name, tool in result.job.hits.instruments.items()}
     return HitsRecord(
-        setups=_setups(result),
+        setups=setups_used(result.job.hits, result.sighting.poses, _mask_of_used(result)),
         shared=shared_of(result.sighting.told, certificates, result.sighting.told_m),
         rings=_rings(result),
-        incidence=_incidence_classes(result.sighting),
+        incidence=incidence_classes(result.sighting.incidence_rad),
         control=_control_readings(repeats),
         drifts=[
             DriftOfSetup(
@@ -110,20 +110,24 @@ def save_hits(result):
     )
 
 
-def _setups(result):
-    """Return `HitSetupUsed` of each set-up."""
-    hits, poses = result.job.hits, result.sighting.poses
-    setup = np.array(hits.setup)
-    setup_of_point = setup[~hits.check]  # in the order of the job's points
-    is_used = np.zeros(len(setup_of_point), dtype=bool)
+def _mask_of_used(result):
+    """Mask (n,) of the hits on the accepted points of the wall."""
+    measured = np.flatnonzero(~result.job.hits.check)  # in the order of the job's points
+    is_used = np.zeros(len(result.job.hits.check), dtype=bool)
     accepted = result.wall.accepted
-    is_used[accepted[accepted < len(setup_of_point)]] = True  # targets come after the hits
+    is_used[measured[accepted[accepted < len(measured)]]] = True  # targets come after the hits
+    return is_used
+
+
+def setups_used(hits, poses, is_used):
+    """`HitSetupUsed` of each set-up; `is_used` (n,) is the mask of the accepted hits."""
+    setup = np.array(hits.setup)
     first = {}
     for index, (name, _) in enumerate(poses.keys):
         first.setdefault(name, index)
     rows = []
     for name, index in first.items():
-        declared, is_here = hits.setups[name], setup_of_point == name
+        declared, is_here = hits.setups[name], setup == name
         x_m, y_m, z_m = poses.xyz_m[index].tolist()
         rows.append(
             HitSetupUsed(
@@ -136,8 +140,8 @@ def _setups(result):
                 z_m=z_m,
                 tie=poses.ties[index],
                 hits=np.count_nonzero(is_here & is_used),
-                rejected=np.count_nonzero(is_here & ~is_used),
-                checks=np.count_nonzero((setup == name) & hits.check),
+                rejected=np.count_nonzero(is_here & ~hits.check & ~is_used),
+                checks=np.count_nonzero(is_here & hits.check),
             )
         )
     return rows
@@ -166,10 +170,10 @@ def _rings(result):
     ]
 
 
-def _incidence_classes(sighting):
-    """Return the histogram of incidence up to the last class with hits."""
+def incidence_classes(incidence_rad):
+    """Histogram of angles of incidence, up to the last class with hits."""
     edges = np.arange(0, LAST_DEG + 1, CLASS_DEG)
-    counts = np.histogram(np.degrees(sighting.incidence_rad), edges)[0]
+    counts = np.histogram(np.degrees(incidence_rad), edges)[0]
     last = np.flatnonzero(counts)[-1] + 1
     return [
         IncidenceClass(low_deg=float(low), high_deg=float(low + CLASS_DEG), hits=count)

@@ -14,7 +14,7 @@ from tankcal.errors import Problem
 from tankcal.geometry.circles import taubin_circle
 from tankcal.geometry.shell import course_of
 from tankcal.messages import list_some, message
-from tankcal.pipeline.checks.moved_setups import (
+from tankcal.methods.moved_setups import (
     critical_of_ranging,
     moved_or_ranged,
     worst_setup,

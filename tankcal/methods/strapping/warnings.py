@@ -10,8 +10,8 @@ from tankcal.adjust import CRITICAL, SD_OVER_MEDIAN
 from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.methods.base import completing_method
+from tankcal.methods.moved_setups import tested
 from tankcal.methods.strapping.tape_warnings import check_tapes
-from tankcal.pipeline.checks.moved_setups import tested
 from tankcal.pipeline.checks.size import (
     allowed_departure_m,
     check_side,

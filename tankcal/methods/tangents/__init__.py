@@ -77,7 +77,7 @@ class TangentsMethod(Method):
         return set(job.tangents.instrument)
 
     def detectable_m(self, job, wall, sights):
-        from tankcal.pipeline.checks.moved_setups import judge_tangents
+        from tankcal.methods.moved_setups import judge_tangents
 
         return judge_tangents(job, wall, sights).mdb_m[~job.tangents.check]
 

@@ -73,7 +73,7 @@ class TangentsRecord(Saved):
 
 def save_tangents(result):
     """`TangentsRecord` of a result."""
-    from tankcal.pipeline.checks.moved_setups import judge_tangents
+    from tankcal.methods.moved_setups import judge_tangents
 
     tests = judge_tangents(result.job, result.wall, result.touching)
     hull = result.touching.hull
@@ -88,7 +88,7 @@ def save_tangents(result):
 
 
 def _setups(result, tests):
-    from tankcal.pipeline.checks.moved_setups import critical_of_setup
+    from tankcal.methods.moved_setups import critical_of_setup
 
     tangents, poses = result.job.tangents, result.touching.poses
     setup, found, first = np.array(tangents.setup), [], {}
@@ -140,7 +140,7 @@ def _readings(result, tests):
 
 
 def _levels(result, tests):
-    from tankcal.pipeline.checks.moved_setups import least_tangents
+    from tankcal.methods.moved_setups import least_tangents
 
     job, least = result.job, least_tangents(result.job)
     counted = np.flatnonzero(~job.tangents.check)

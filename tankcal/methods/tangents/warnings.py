@@ -6,7 +6,7 @@ from scipy.stats import norm
 from tankcal.errors import Problem
 from tankcal.geometry.shell import course_of
 from tankcal.messages import message
-from tankcal.pipeline.checks.moved_setups import (
+from tankcal.methods.moved_setups import (
     TANGENT_LIMITS,
     judge_tangents,
     least_tangents,

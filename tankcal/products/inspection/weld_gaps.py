@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.messages import message
-from tankcal.pipeline.cloud_passes import Placing, Reading, Telling, open_passes
+from tankcal.methods.clouds.passes import Placing, Reading, Telling, open_passes
 from tankcal.products.inspection.boards import (
     REACH_M,
     TOGETHER,
@@ -48,7 +48,7 @@ def find_gaps(result, limits_mm, reading=None, progress=None):
         Result for an upright tank. The files of its clouds are read again.
     limits_mm : dict
         Limits of the rule, {"peaking": mm, "banding": mm}. A missing key is an unknown limit.
-    reading : tankcal.pipeline.cloud_passes.Reading, optional
+    reading : tankcal.methods.clouds.passes.Reading, optional
         Number of workers; by default the files are read in this process.
     progress : callable, optional
         Function that receives a message for each step.

@@ -129,7 +129,7 @@ def _write_documents(tickets, folder, show):
     """
     from tankcal.products.quantity.saving import document_file
     from tankcal.report.ticket import refuse_foreign, write_ticket
-    from tankcal.report.ticket.booklet import BOOKLET, refuse_foreign_booklet, write_booklet
+    from tankcal.report.ticket.pages import BOOKLET, refuse_foreign_booklet, write_booklet
     from tankcal.text.naming import file_name
     from tankcal.text.words import load_words
 
