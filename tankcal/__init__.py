@@ -32,7 +32,7 @@ if TYPE_CHECKING:  # what a type checker reads; nothing of it runs
 
     __version__: str
 
-_ROOM_OF = {
+_MODULE_OF = {
     "load": "job",
     "Job": "job",
     "run": "pipeline.chain",
@@ -71,9 +71,9 @@ __all__ = [
 def __getattr__(name: str):
     if name == "__version__":
         return import_module("tankcal.version").find_version()
-    if name not in _ROOM_OF:
+    if name not in _MODULE_OF:
         raise AttributeError(f"module 'tankcal' has no attribute {name!r}")
-    return getattr(import_module(f"tankcal.{_ROOM_OF[name]}"), name)
+    return getattr(import_module(f"tankcal.{_MODULE_OF[name]}"), name)
 
 
 def __dir__():

@@ -5,7 +5,7 @@ Names are imported on first use, so that reading a job imports the measurements 
 
 from importlib import import_module
 
-_ROOM_OF = {
+_MODULE_OF = {
     "Adjustment": "results",
     "Cause": "results",
     "Dependence": "results",
@@ -18,13 +18,13 @@ _ROOM_OF = {
     "wall_points": "points",
 }
 
-__all__ = [*_ROOM_OF]
+__all__ = [*_MODULE_OF]
 
 
 def __getattr__(name):
-    if name not in _ROOM_OF:
+    if name not in _MODULE_OF:
         raise AttributeError(f"module 'tankcal.survey' has no attribute {name!r}")
-    return getattr(import_module(f"tankcal.survey.{_ROOM_OF[name]}"), name)
+    return getattr(import_module(f"tankcal.survey.{_MODULE_OF[name]}"), name)
 
 
 def __dir__():

@@ -97,7 +97,7 @@ def test_an_adjustment_shows_its_points(adjusted):
 
 def test_package_is_marked_as_typed():
     assert Path(tankcal.__file__).with_name("py.typed").exists()
-    assert set(tankcal.__all__) - {"__version__"} == set(tankcal._ROOM_OF)
+    assert set(tankcal.__all__) - {"__version__"} == set(tankcal._MODULE_OF)
 
 
 def test_tankcal_alone_prints_its_help(capsys):
