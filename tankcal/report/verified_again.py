@@ -445,7 +445,7 @@ def _not_computed(name):
     )
 
 
-# ---- content of a paper
+# ---- content of a document
 
 NUMBER = re.compile(r"(?<![\w.,])\d[\d.,]*")
 WORD = re.compile(r"[^\W\d_]{2,}")
