@@ -315,7 +315,7 @@ LIMITS = [
     ),
     (
         "docs/tangents.md",
-        "touches the wall more than () m from its level",
+        "a tangent more than () m from its level",
         [TANGENTS["level_m"]],
     ),
     ("docs/tangents.md", "departs from the nominal radius by more than () in ()", ONE_IN_500),
