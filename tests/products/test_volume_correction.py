@@ -9,7 +9,8 @@ from tankcal.products.quantity.chain import Gauging, Product, follow_chain
 from tankcal.products.quantity.table import TankTable
 from tankcal.tank.volume_correction.alcohol import Ethanol, mixture_density
 from tankcal.tank.volume_correction.brazil import Brazil
-from tankcal.tank.volume_correction.corrections import WATER_60F, Constant, LiquefiedGas
+from tankcal.tank.volume_correction.corrections import Constant
+from tankcal.tank.volume_correction.gases import WATER_60F, LiquefiedGas
 from tankcal.tank.volume_correction.petroleum import (
     KPA_PER_PSI,
     WATER_1980,
