@@ -42,6 +42,7 @@ BENCHMARKS = {
     "exports": (),
     "ships": (),
     "writing": ("--runs", "1"),
+    "app": (),
     "growth": (),
     "adjustment/run": (),
 }

@@ -17,7 +17,7 @@ class Visitor:
     """Requests pages of the app as a browser does, with its cookie and its origin."""
 
     def __init__(self, address):
-        self.root = address.split("/?")[0]
+        self.root = "/".join(address.split("/")[:3])
         cookies = urllib.request.HTTPCookieProcessor(CookieJar())
         self.opener = urllib.request.build_opener(cookies)
         self.home = self.get(address[len(self.root) :])
@@ -50,14 +50,16 @@ class Visitor:
         return self.path
 
     def compute(self, job, documents, within_s=300):
-        """Compute a job and wait for its certificate or table."""
+        """Compute a job and wait for its results page."""
         self.post(f"{job}run", documents="yes" if documents else "")
         end = time.monotonic() + within_s
-        while "headline" not in (page := self.get(f"{job}results")):
+        while True:
+            page = self.get(f"{job}results")
+            if 'id="progress" hidden' in page and "headline" in page:  # no run is active
+                return page
             if time.monotonic() > end:
                 raise TimeoutError(page)
-            time.sleep(0.2)
-        return page
+            time.sleep(0.5)
 
     def events(self, job):
         """Open connection to the events of a job, as a window keeps."""
