@@ -21,6 +21,7 @@ OF_RULE = {  # {verdict: group of the short words for its codes}
     "rule_verdict": "rule_verdicts",
     "comparison_verdict": "comparison_verdicts",
     "inspection_verdict": "inspection_verdicts",
+    "alarm_verdict": "alarm_verdicts",
     "global_test": "global_tests",
 }
 MOST_ROWS = 5000  # of the page; jobs that are not done take precedence
@@ -111,6 +112,11 @@ class SummaryPaper(PlainPaper):
             return self.word("changes.verdict", what=what, old=old, new=new)
         return self.word(f"changes.{code}")
 
+    def causes(self, row):
+        """Return the possible causes of an alarm as a text, or None without alarm."""
+        kinds = row.get("causes") or ()
+        return ", ".join(self.words["upkeep"]["kinds"][kind] for kind in kinds) or None
+
     def first_message(self, row):
         """Return the first problem, else the first warning, with the number of others; or None."""
         entries, count = row["problems"], row["problem_count"]
@@ -133,6 +139,7 @@ class SummaryPaper(PlainPaper):
         """Return a row of the CSV file: codes and numbers, and texts in the language."""
         return row | {
             "changes": self.changes(row),
+            "causes": self.causes(row),
             "told": self.first_message(row),
             "papers": row["papers"][0] if row["papers"] else None,
         }
@@ -158,6 +165,13 @@ JOBS = Table(
         _verdict("rule_verdict"),
         _verdict("comparison_verdict"),
         _verdict("inspection_verdict"),
+        _verdict("alarm_verdict"),
+        Column("alarm", text=lambda paper, row: row.get("alarm"), sheet=True, width=12,
+               optional=True),
+        Column("causes", text=lambda paper, row: paper.causes(row), sheet=True, width=30,
+               optional=True),
+        Column("leak_l_h", u="leak_U_l_h", least=1, sheet=True, width=12, optional=True),
+        Column("leak_U_l_h", u="leak_U_l_h", least=1, sheet=True, width=12, optional=True),
         Column("warning_count", decimals=0, sheet=True, width=10),
         Column("changes", text=lambda paper, row: paper.changes(row), sheet=True, width=30,
                optional=True),
@@ -174,6 +188,7 @@ CSV_COLUMNS = Table(
         for key in (
             *("name", "source", "status", "tank", "kind", "date", "height_m", "volume_m3", "U_m3"),
             *("global_test", "rule", "rule_verdict", "comparison_verdict", "inspection_verdict"),
+            *("alarm_verdict", "alarm", "causes", "leak_l_h", "leak_U_l_h"),
             *("warning_count", "problem_count", "changes", "told", "papers"),
         )
     ),
@@ -202,9 +217,19 @@ def page_blocks(paper):
         ),
         blocks.masthead(title, paper.word("texts.steps", steps=steps)),
         blocks.key_values(_counts(paper)),
+        *_false_alarms(paper),
         *_gone(paper),
         *_rows(paper),
     ]
+
+
+def _false_alarms(paper):
+    """Number of false alarms that the declared rates of all watched tanks let expect."""
+    expected = [row["false_alarms"] for row in paper.summary["rows"] if row.get("false_alarms")]
+    if not expected:
+        return []
+    number = paper.number(sum(expected), decimals=1)
+    return [blocks.paragraph(paper.word("texts.false_alarms", number=number))]
 
 
 def _counts(paper):

@@ -1,4 +1,4 @@
-"""Papers of a notebook: the executed notebook, its PDFs and its web page."""
+"""Documents of a notebook: the executed notebook, its PDFs and its web page."""
 
 from pathlib import Path
 
@@ -27,7 +27,7 @@ _PARTS = (  # name of each PDF and the part of the notebook that it contains
     ("field-table.pdf", "field-table"),
     ("report.pdf", ""),
 )
-# Papers of a record without a capacity table.
+# PDFs of a record without a capacity table.
 _PARTS_OF_SURVEY = (("working-papers.pdf", "working-papers"),)
 
 

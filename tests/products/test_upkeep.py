@@ -242,6 +242,31 @@ def test_months_with_state_equal_a_single_run(record, tmp_path, capsys, monkeypa
     assert not [path for path in state.iterdir() if path.suffix != ".npz"]
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("language", ["en", "es", "pt-BR"])
+def test_batch_lists_alarms(record, tmp_path, capsys, language):
+    """Two tanks, of which one loses 0.757 L/h from day 30 on: the summary names its alarm."""
+    for name, fault in (("valid", ""), ("leaking", "leak")):
+        make_station(tmp_path / "site" / name, record, 60, fault=fault, fault_day=30.0,
+                     fault_size=0.757 * 3)  # fmt: skip
+    out = tmp_path / "out"
+    batch = ["batch", str(tmp_path / "site"), "--do", "upkeep", "--no-papers", "--out", str(out),
+             "--workers", "0", "--language", language, "--quiet"]  # fmt: skip
+    assert cli.main(batch) == 0
+    rows = {row["name"]: row for row in json.loads((out / "summary.json").read_text())["rows"]}
+    assert rows["valid"]["alarm_verdict"] == "none"
+    assert rows["leaking"]["alarm_verdict"] in ("named", "open")
+    assert "leak" in rows["leaking"]["causes"]
+    assert "2025-02" in rows["leaking"]["alarm"]
+    expected = {"en": "ALARM", "es": "ALARMA", "pt-BR": "ALARME"}[language]
+    assert expected in (out / "summary.html").read_text()
+    outcome = (out / "jobs" / "valid" / "upkeep" / "upkeep.json").stat().st_mtime_ns
+    assert cli.main(batch) == 0  # nothing changed
+    assert (out / "jobs" / "valid" / "upkeep" / "upkeep.json").stat().st_mtime_ns == outcome
+    assert cli.main([*batch[:3], "upkeep,export", *batch[4:]]) == 2
+    assert "upkeep" in capsys.readouterr().err
+
+
 @pytest.fixture(scope="module")
 def improved(record, tmp_path_factory):
     """Folder of a station whose levels move over half of the tank, and its new record."""

@@ -32,11 +32,11 @@ def add(commands):
     batch = commands.add_parser(
         "batch",
         help="compute many jobs, on all cores or a cluster",
-        description="Carry out the chosen steps (run, report, compare, inspect, export) for each "
-        "of many jobs. The results of each job are in its folder under DIR/jobs; summary.html, "
-        "summary.xlsx, summary.csv and summary.json summarise all jobs. The same command again "
-        "computes new and changed jobs only, and continues a batch that was interrupted. See "
-        "docs/batch.md.",
+        description="Carry out the chosen steps (run, report, compare, inspect, export, or upkeep "
+        "alone) for each of many jobs. The results of each job are in its folder under DIR/jobs; "
+        "summary.html, summary.xlsx, summary.csv and summary.json summarise all jobs. The same "
+        "command again computes new and changed jobs only, and continues a batch that was "
+        "interrupted. See docs/batch.md.",
         epilog="exit status: 0 all jobs done; 2 some jobs were refused or failed (one line each), "
         "or the batch could not start; 3 all other jobs are done, but some surveys have no "
         "valid solution; 130 stopped by Ctrl-C: the same command continues the batch.",
@@ -57,8 +57,8 @@ def add(commands):
         "--do",
         metavar="STEPS",
         default="run",
-        help="one or more of run, report, compare, inspect and export, separated by commas "
-        "(default: run)",
+        help="run, report, compare, inspect, export or several of these, separated by commas, "
+        "or upkeep (default: run)",
     )
     who = batch.add_mutually_exclusive_group()
     who.add_argument(
@@ -101,7 +101,9 @@ def add(commands):
     of_papers = batch.add_mutually_exclusive_group()
     add_letterhead(of_papers)
     of_papers.add_argument(
-        "--no-papers", action="store_true", help="for run: write the record and the CSV files only"
+        "--no-papers",
+        action="store_true",
+        help="for run: write the record and the CSV files only; for upkeep: upkeep.json only",
     )
     add_language(batch)
     batch.add_argument("--quiet", action="store_true", help="no progress, only problems")

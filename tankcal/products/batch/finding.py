@@ -37,7 +37,8 @@ from tankcal.text.delimited import split_cells
 from tankcal.text.naming import file_name
 
 RECORD = "record.json"
-SAVED = (RECORD, "comparison.json", "inspection.json")
+SAVED = (RECORD, "comparison.json", "inspection.json", "upkeep.json")
+UPKEEP_FILE = "upkeep.toml"
 BOOK = ".xlsx"
 OUTCOME, OF_BATCH = "outcome.json", ("report", "export")  # file and folders of a job of a batch
 PATTERN = re.compile(r"[*?\[]")
@@ -119,16 +120,18 @@ def find_jobs(arguments, options, out=None, known=None):
 
 @dataclass(frozen=True)
 class _Target:
-    """Kind of objects to search for ("jobs", "records" or "either") and the folder to skip."""
+    """Kind of objects to search for (see `_kind_of_input`), and the folder to skip."""
 
     kind: str
     out: str | None
 
 
 def _kind_of_input(steps):
-    """Return the input of the steps: "jobs", "records", or "either" with jobs preferred."""
+    """Return the input of the steps: "jobs", "records", "upkeeps", or "either", jobs preferred."""
     if "run" in steps:
         return "jobs"
+    if steps == ("upkeep",):
+        return "upkeeps"
     return "either" if steps == ("inspect",) else "records"
 
 
@@ -179,6 +182,10 @@ def _empty_folder_message(kind):
             "contains no results; expected folders with record.json, such as results of tankcal "
             "run",
         )
+    if kind == "upkeeps":
+        return message(
+            "batch_no_upkeeps", "contains no tank in service; expected folders with upkeep.toml"
+        )
     return message(
         "batch_no_jobs",
         "contains no job; expected job folders with job.toml, or job workbooks (.xlsx)",
@@ -187,6 +194,9 @@ def _empty_folder_message(kind):
 
 def _job_of_path(path, target):
     """Return the job that a path is, or None."""
+    if target.kind == "upkeeps":
+        path = path.parent if path.name == UPKEEP_FILE else path
+        return path if (path / UPKEEP_FILE).is_file() else None
     if path.name == SETTINGS_FILE and path.is_file():
         path = path.parent
     if (path / SETTINGS_FILE).is_file():
@@ -223,6 +233,11 @@ def _find_in_folder(folder, target):
             if folder_name[0] != "." and not (of_batch and folder_name in OF_BATCH)
         )
         saved = [name for name in SAVED if name in names]
+        if target.kind == "upkeeps":
+            if UPKEEP_FILE in names:
+                sources.append(place)
+                folders.clear()
+            continue
         if target.kind == "records":
             sources += [place / name for name in saved]
         elif SETTINGS_FILE in names:

@@ -49,6 +49,7 @@ OF_STEP = {  # attributes of `Options` that affect a step
     "compare": ("language",),
     "inspect": ("language",),
     "export": ("language",),
+    "upkeep": ("language", "papers"),
 }
 FILES_OF_STEP = {
     "run": ("letterhead",),
@@ -56,6 +57,7 @@ FILES_OF_STEP = {
     "compare": ("compare_by", "letterhead"),
     "inspect": ("inspect_by", "letterhead"),
     "export": ("profile",),
+    "upkeep": ("letterhead",),
 }
 
 
@@ -180,6 +182,11 @@ def compute_keys(job, former=None):
             bears.pop("letterhead")
         if step == "compare":
             bears["former"] = None if former is None else digest_inputs(former)
+        if step == "upkeep":
+            from tankcal.products.upkeep.reading import find_record
+
+            record = find_record(job.source)
+            bears["former"] = None if record is None else digest_inputs(record)
         text = json.dumps(bears, sort_keys=True)
         keys[step] = sha256(text.encode()).hexdigest()
     return keys

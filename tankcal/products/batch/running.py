@@ -47,11 +47,16 @@ WORKER_BYTES = 2 << 30
 ALLOWED_FAILURES = "distributed.scheduler.allowed-failures"
 VALUES = (
     *("tank", "kind", "date", "height_m", "volume_m3", "U_m3", "global_test", "rule"),
-    *("rule_verdict", "comparison_verdict", "inspection_verdict"),
+    *("rule_verdict", "comparison_verdict", "inspection_verdict", "alarm_verdict", "alarm"),
+    *("causes", "leak_l_h", "leak_U_l_h", "false_alarms"),
 )
-VERDICTS = ("global_test", "rule_verdict", "comparison_verdict", "inspection_verdict")
+VERDICTS = (
+    *("global_test", "rule_verdict", "comparison_verdict", "inspection_verdict"),
+    "alarm_verdict",
+)
 PAPERS = (  # in order of priority: the summary links to the first
-    *("certificate.pdf", "report.pdf", "comparison.pdf", "inspection.pdf", "capacity.xlsx"),
+    *("certificate.pdf", "report.pdf", "comparison.pdf", "inspection.pdf", "upkeep.pdf"),
+    "capacity.xlsx",
     *("capacity.csv", "record.json"),
 )
 MOST_REPORTED = 1  # problems and warnings of a job in the summary

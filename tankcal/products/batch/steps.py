@@ -25,7 +25,7 @@ from tankcal.products.batch.outcomes import (
 )
 from tankcal.record.inspection import VERDICTS
 
-IN_THE_WAY = (errno.EEXIST, errno.EISDIR, errno.ENOTDIR)  # errors of one job, not of the batch
+IN_THE_WAY = (errno.EEXIST, errno.EISDIR, errno.ENOTDIR)  # errors of a job, not of the batch
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 STATUS_OF_EXIT = {2: "refused", 3: "unsound"}
 
@@ -250,8 +250,34 @@ def _export(task, clock):
         return write_export(export, temporary / default_name(export), language)
 
 
+def _upkeep(task, clock):
+    from tankcal.products.upkeep.paper import DOCUMENT
+    from tankcal.products.upkeep.reading import read_upkeep
+    from tankcal.products.upkeep.state import State
+    from tankcal.products.upkeep.upkeep import keep_up
+    from tankcal.record import save
+    from tankcal.record.schema import to_plain
+    from tankcal.report import folders
+
+    options, place = task.job.options, _place(task, "upkeep")
+    # Results of earlier months, so that a batch each month computes the new month only.
+    state = State(place.with_name("state"))
+    with clock.step("read"):
+        inputs = read_upkeep(task.job.source, state)
+    with clock.step("compute"):
+        upkeep = to_plain(keep_up(inputs, state))
+    language = options.language or inputs.sections["upkeep"]["language"]
+    if options.papers:
+        return DOCUMENT.write(upkeep, place, language, None, _letterhead(options))
+    DOCUMENT.refuse_foreign(place)
+    with folders.replace_folder(place, language) as temporary:
+        save(upkeep, temporary / DOCUMENT.saved_format.file)
+    return [place / DOCUMENT.saved_format.file]
+
+
 _STEP_FUNCTIONS = {
     "run": _run, "report": _report, "compare": _compare, "inspect": _inspect, "export": _export,
+    "upkeep": _upkeep,
 }  # fmt: skip
 
 
@@ -370,7 +396,25 @@ def _read_inspection(inspection):
     return {"tank": inspection["tank"]["id"], "inspection_verdict": worst}
 
 
-_READERS = dict(zip(SAVED, (_read_record, _read_comparison, _read_inspection), strict=True))
+def _read_upkeep(upkeep):
+    watch, month = upkeep["watch"], upkeep["months"][-1]
+    is_named = watch["alarm"] is not None and watch["is_named"]
+    possible = [suspect for suspect in watch["suspects"] if suspect["is_possible"]]
+    return {
+        "tank": upkeep["tank"],
+        "date": upkeep["period"]["last"],
+        "alarm_verdict": "named" if is_named else "open" if watch["alarm"] else "none",
+        "alarm": watch["alarm"],
+        "causes": list(dict.fromkeys(suspect["kind"] for suspect in possible)) or None,
+        "leak_l_h": month["leak_l_h"],
+        "leak_U_l_h": month["U_l_h"],
+        "false_alarms": watch["rate_per_year"] * upkeep["period"]["days"] / 365.25,
+    }
+
+
+_READERS = dict(
+    zip(SAVED, (_read_record, _read_comparison, _read_inspection, _read_upkeep), strict=True)
+)
 
 
 def find_inspection_source(job, results):

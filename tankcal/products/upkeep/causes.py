@@ -216,11 +216,13 @@ class Operation:
         start = marks.time_ns[0] if self.start_ns is None else self.start_ns
         years = (marks.time_ns - start) * 1e-9 / YEAR_S
         warm = fill_gaps(marks.time_ns, marks.temperature_c, self.stock.base_c)
-        level_causes = self._level_causes(marks.level_m)
+        # At adjusted levels, as all columns: readings share their errors with the misclosures.
+        own_error = smoothed[:, 0] + smoothed[:, 1]
+        level_causes = self._level_causes(marks.level_m - own_error)
         shapes = len(self.stock.names)
         x = np.zeros(shapes + level_causes[0].shape[1]) if estimate is None else estimate
         moved = level_causes[0] @ x[shapes : shapes + level_causes[0].shape[1]]
-        error = moved + smoothed[:, 0] + smoothed[:, 1]
+        error = moved + own_error
         level, form, warmer = marks.level_m - error, x[:shapes], warm + smoothed[:, 2]
         low, high = self.stock.table.height_m[[0, -1]]
         level = np.clip(level, low + LEVEL_STEP_M, high - LEVEL_STEP_M)
@@ -269,7 +271,7 @@ class Operation:
         # Estimates that were inserted are unknowns about 0: their linear effect is restored.
         used = shapes + level_causes[0].shape[1]
         misclosure = misclosure + columns[:, :used] @ x[:used]
-        at_marks = area * (smoothed[:, 0] + smoothed[:, 1]) - by_degree * smoothed[:, 2]
+        at_marks = area * own_error - by_degree * smoothed[:, 2]
         misclosure = misclosure - np.diff(at_marks)
         of_ticket = prior["ticket_own_percent"] / 100
         by_degree_ticket = self.stock.expansion_per_k * prior["ticket_temperature_k"]

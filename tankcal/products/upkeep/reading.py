@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import tomllib
 from dataclasses import dataclass, replace
 from pathlib import Path
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
@@ -159,6 +160,27 @@ class Inputs:
     def table(self):
         """Capacity table in force."""
         return self.operation.stock.table
+
+
+def find_record(folder):
+    """Record that upkeep.toml of a folder names; None if it cannot be found.
+
+    Parameters
+    ----------
+    folder : path
+
+    Returns
+    -------
+    Path or None
+    """
+    folder = Path(folder)
+    try:
+        settings = tomllib.loads((folder / SETTINGS).read_text(encoding="utf-8"))
+        path = folder / settings["upkeep"]["record"]
+    except (OSError, ValueError, LookupError, TypeError):
+        return None  # `read_upkeep` reports it
+    path = path / "record.json" if path.is_dir() else path
+    return path if path.is_file() else None
 
 
 def read_upkeep(folder, state=NO_STATE):

@@ -39,7 +39,7 @@ def write(
     letterhead: "Letterhead | None" = None,
     papers: bool = True,
 ) -> list[Path]:
-    """Write all files of a result: record, CSV files, workbook, certificate.xml, and papers.
+    """Write all files of a result: record, CSV files, workbook, certificate.xml, and reports.
 
     Parameters
     ----------
