@@ -8,7 +8,7 @@ from tankcal.job.checks.survey.readings import bars_of, bars_used, is_bar
 from tankcal.job.contract.observations import ANGLES, READINGS
 from tankcal.job.contract.registers import FREE, INSTRUMENT_KINDS
 from tankcal.job.imagery import imagery_of
-from tankcal.job.structure import structure
+from tankcal.job.structure import angle_in_rad, structure
 from tankcal.survey.measurements import (
     AdjustmentSettings,
     CorrelatedReadings,
@@ -23,9 +23,8 @@ from tankcal.survey.measurements import (
     Targets,
 )
 from tankcal.survey.stadia import distance_of_angle_m, distance_sd_m
-from tankcal.units import ARCSEC, GON
+from tankcal.units import ARCSEC
 
-RADIANS = {"deg": np.pi / 180, "gon": GON, "dms": np.pi / 180}
 PRINTED = ("certificate", "tension_n")  # keys of instruments that the report shows
 
 
@@ -94,17 +93,6 @@ def _nominal(values):
 def _check(table):
     """True for each row that is used only as a check, shape (n,)."""
     return np.array([use == "check" for use in table.of("use")], dtype=bool)
-
-
-def angle_in_rad(table, name):
-    """Angle of each row, shape (n,), rad, from any of its units; nan where it is blank."""
-    angle = np.full(len(table.rows), np.nan)
-    for unit, factor in RADIANS.items():
-        column = f"{name}_{unit}"
-        if table.columns.get(column) is not None:
-            given = table.numbers(column) * factor
-            angle = np.where(np.isnan(given), angle, given)
-    return angle
 
 
 def _photos(table, images):

@@ -9,7 +9,7 @@ from dataclasses import MISSING, fields
 
 import numpy as np
 
-from tankcal.units import ARCSEC
+from tankcal.units import ARCSEC, GON
 
 # Unit at the end of a name in a job: unit at the end of the attribute, and conversion. Values are
 # divided by 1000, not multiplied by 0.001, which has no exact binary form.
@@ -26,6 +26,7 @@ _CONVERSIONS = {
     "_mpa": ("_pa", lambda value: 1e6 * value),
     "_gpa": ("_pa", lambda value: 1e9 * value),
 }
+_RADIANS = {"deg": np.pi / 180, "gon": GON, "dms": np.pi / 180}  # by the ending of a column
 
 
 def to_si(values):
@@ -96,3 +97,14 @@ def structure(cls, values, **others):
         if converted[field.name] is not None or not has_default:
             arguments[field.name] = converted[field.name]
     return cls(**arguments)
+
+
+def angle_in_rad(table, name):
+    """Angle of each row, shape (n,), rad, from any of its units; nan where it is blank."""
+    angle = np.full(len(table.rows), np.nan)
+    for unit, factor in _RADIANS.items():
+        column = f"{name}_{unit}"
+        if table.columns.get(column) is not None:
+            given = table.numbers(column) * factor
+            angle = np.where(np.isnan(given), angle, given)
+    return angle

@@ -39,7 +39,7 @@ from tankcal.methods.inside_hits import solid as inside_solid
 from tankcal.methods.lines import warnings
 from tankcal.methods.lines import warnings as lines_warnings
 from tankcal.methods.liquid import columns as liquid_columns
-from tankcal.methods.liquid import tables as liquid_facts
+from tankcal.methods.liquid import facts as liquid_facts
 from tankcal.methods.strapping import tape_warnings
 from tankcal.pipeline import cluster, scanned_solids
 from tankcal.pipeline import overruling_effects as overruling

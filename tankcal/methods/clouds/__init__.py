@@ -56,7 +56,7 @@ class CloudsMethod(Method):
         )
 
     def check(self, values, tables, registers, raw, log):
-        from tankcal.methods.clouds.readings import check_clouds
+        from tankcal.methods.clouds.checks import check_clouds
 
         check_clouds(values, tables, registers, raw, log)
 
@@ -118,7 +118,7 @@ class CloudsMethod(Method):
         return figures
 
     def facts(self):
-        from tankcal.methods.clouds.tables import FACTS
+        from tankcal.methods.clouds.facts import FACTS
 
         return FACTS
 

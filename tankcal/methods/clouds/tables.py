@@ -225,25 +225,3 @@ TABLES = (
     *(FILES, SCANS, POINTS, SCANNERS, SHARED, TARGETS, OVERLAPS, COURSES, OBSTRUCTIONS),
     *(JOINTS, WELDS, THINGS, SHARE_OF_U),
 )
-
-
-# ---- fact of the certificate
-
-
-def _scanned(paper, row):
-    """Return a sentence on the point clouds with their numbers of points, or None."""
-    clouds = paper.record.get("clouds")
-    if not clouds:
-        return None
-    scans = clouds["scans"]
-    return paper.word(
-        "texts.cloud_method",
-        scans=len(scans),
-        files=len(clouds["files"]),
-        wall=sum(scan["of_wall"] for scan in scans),
-        read=sum(scan["delivered"] for scan in scans),
-        means=sum(scan["readings"] for scan in scans),
-    )
-
-
-FACTS = (Column("scanned", text=_scanned, sheet=True),)

@@ -15,10 +15,10 @@ from tankcal.job.model import InputFile
 from tankcal.job.tables import unreadable_file
 from tankcal.messages import message
 from tankcal.methods.clouds.bottom import CloudInside, find_inside, with_bottom
+from tankcal.methods.clouds.checks import offset_untold
 from tankcal.methods.clouds.columns import UNITS_M
 from tankcal.methods.clouds.overlaps import normals_of, overlaps_of, scans_apart
 from tankcal.methods.clouds.passes import Placing, Reading, Telling, open_passes
-from tankcal.methods.clouds.readings import offset_untold
 from tankcal.pipeline.scanned_solids import fit_scan
 from tankcal.pipeline.wall.finding import find_wall, joints_of, through_wall
 from tankcal.pipeline.wall.shared_unknowns import told_causes

@@ -10,9 +10,8 @@ from tankcal.job.checks.survey.files import SurveyFiles, refuse_undefined
 from tankcal.job.checks.survey.readings import check_angle, check_correction, warn_copies
 from tankcal.job.checks.tapes import refuse_others, tapes_of
 from tankcal.job.contract.registers import FREE, USUAL_INCIDENCE_MM
-from tankcal.job.measuring import angle_in_rad, setups_of
+from tankcal.job.structure import angle_in_rad
 from tankcal.messages import message
-from tankcal.survey.sighting import bias_by_incidence, rays
 from tankcal.survey.wall_hits import (
     FEWEST_HITS,
     MOST_HITS,
@@ -229,6 +228,8 @@ def make_hits(tables, registers):
 
 
 def _setups(table, registers):
+    from tankcal.job.measuring import setups_of  # not loaded for a job without a survey
+
     used = instruments_used(table, ranging_of(registers))
     return {setup.name: replace(setup, instrument=used[setup.name]) for setup in setups_of(table)}
 
@@ -284,6 +285,8 @@ def levels_of_hits(job):
 
 def observe_hits(job, wall, errors):
     """Return hits along their own sights, up to the inside or outside of the wall."""
+    from tankcal.survey.sighting import bias_by_incidence, rays
+
     hits, levels = job.hits, levels_of_hits(job)
     station, ray = _stations_of_hits(hits)[:, :2], rays(hits.direction_rad, hits.zenith_rad)[0]
     inside, ray = np.hypot(*station.T) < wall.nominal_m, ray[:, :2]

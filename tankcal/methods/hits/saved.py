@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from tankcal.methods.hits.warnings import drifts_of, repeats_of
 from tankcal.record.ranging import SharedByHits, departure_from_sections, shared_of
 from tankcal.record.schema import Finite, Saved, key
 from tankcal.units import HOUR_S
@@ -89,6 +88,8 @@ class HitsRecord(Saved):
 
 def save_hits(result):
     """Return the `HitsRecord` of a result."""
+    from tankcal.methods.hits.warnings import drifts_of, repeats_of
+
     repeats = repeats_of(result.job.hits.control)
     certificates = {name: tool.certificate for name, tool in result.job.hits.instruments.items()}
     return HitsRecord(

@@ -74,14 +74,14 @@ class LiquidMethod(Method):
         )
 
     def check(self, values, tables, registers, raw, log):
-        from tankcal.methods.liquid.readings import check_liquid, tell_without_rows
+        from tankcal.methods.liquid.checks import check_liquid, tell_without_rows
 
         if not self.is_given(tables):
             tell_without_rows(tables, registers, raw, log)
             return
         check_liquid(values, tables, registers, raw, log)
         if values is not None:
-            from tankcal.methods.liquid.readings import check_metering
+            from tankcal.methods.liquid.checks import check_metering
 
             check_metering(values, tables, registers, raw, log)
 
@@ -143,12 +143,12 @@ class LiquidMethod(Method):
         return figures
 
     def facts(self):
-        from tankcal.methods.liquid.tables import FACTS
+        from tankcal.methods.liquid.facts import FACTS
 
         return FACTS
 
     def unchecked(self, paper):
-        from tankcal.methods.liquid.tables import hidden_errors
+        from tankcal.methods.liquid.facts import hidden_errors
 
         return hidden_errors(paper)
 

@@ -7,7 +7,8 @@ from tankcal.job.checks.extent import has_survey
 from tankcal.job.checks.survey.files import SurveyFiles, refuse_undefined
 from tankcal.job.checks.survey.readings import check_angle, warn_copies
 from tankcal.job.checks.tapes import check_levels, refuse_others
-from tankcal.job.measuring import angle_in_rad, setups_of
+from tankcal.job.measuring import setups_of
+from tankcal.job.structure import angle_in_rad
 from tankcal.messages import message
 from tankcal.survey.tangents import FEWEST_SETUPS, MOST_TANGENTS, Tangents, too_many_tangents
 from tankcal.units import ARCSEC

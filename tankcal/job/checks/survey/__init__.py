@@ -6,17 +6,6 @@ datum.
 
 from tankcal.job.checking import has_rows, tell
 from tankcal.job.checks.extent import has_survey, is_sighted
-from tankcal.job.checks.survey.cameras import check_cameras, check_depth_of_field
-from tankcal.job.checks.survey.datum import check_datum, check_held, check_known
-from tankcal.job.checks.survey.doubtful import check_doubtful
-from tankcal.job.checks.survey.files import SurveyFiles, check_names
-from tankcal.job.checks.survey.images import check_images
-from tankcal.job.checks.survey.readings import (
-    check_correlated,
-    check_instruments,
-    check_readings,
-    check_stadia,
-)
 from tankcal.job.contract import KEYS
 from tankcal.job.tables import SURVEY_TABLES
 from tankcal.messages import message
@@ -46,6 +35,7 @@ def check_survey(values, tables, registers, raw, is_whole, log):
         )
         log.problem(tables["points"].file, expected)
     reported = frozenset((problem.file, problem.row) for problem in log.problems)
+    from tankcal.job.checks.survey.whole import check_files
 
     check_files(values, tables, registers, raw, log, reported)
 
@@ -71,28 +61,3 @@ def _tell_nothing_to_adjust(values, tables, raw, is_whole, log):
         for field in KEYS[section]:
             if field.of_survey and values is not None and values[section][field.name] is not None:
                 tell(log.warning, raw, section, field.name, expected)
-
-
-def check_files(values, tables, registers, raw, log, reported):
-    """Check the files of a survey.
-
-    Parameters
-    ----------
-    values, tables, registers, raw, log
-        As for `checks.check_all`.
-    reported : frozenset of (str, int)
-        File and row of each problem reported before.
-    """
-    files = SurveyFiles(values, tables, registers, raw, log, reported)
-    check_cameras(files)
-    check_depth_of_field(files)
-    check_instruments(files)
-    check_images(files)
-    check_readings(files)
-    check_stadia(files)
-    check_known(files)
-    check_names(files)
-    check_held(files)
-    check_correlated(files)
-    check_datum(files)
-    check_doubtful(files)
