@@ -34,6 +34,34 @@ if TYPE_CHECKING:
     from tankcal.survey.tangents import Tangents
     from tankcal.survey.wall_hits import WallHits
 
+__all__ = [
+    "Bottom",
+    "Course",
+    "Datum",
+    "Deadwood",
+    "DeclaredInput",
+    "End",
+    "Horizontal",
+    "InputFile",
+    "Inspection",
+    "Job",
+    "Levels",
+    "Material",
+    "Mesh",
+    "Overruling",
+    "Points",
+    "Ring",
+    "Roof",
+    "Ship",
+    "Sphere",
+    "StatedVolume",
+    "Survey",
+    "Switches",
+    "TableSpec",
+    "Tank",
+    "Top",
+]
+
 
 @dataclass(frozen=True)
 class Course:
@@ -356,35 +384,6 @@ class Mesh:
     file: str
     unit_m: float
     data: bytes = field(repr=False)
-
-
-__all__ = [
-    "Bottom",
-    "Course",
-    "Datum",
-    "Deadwood",
-    "DeclaredInput",
-    "End",
-    "Horizontal",
-    "InputFile",
-    "Inspection",
-    "Job",
-    "Levels",
-    "Material",
-    "Mesh",
-    "Overruling",
-    "Points",
-    "Ring",
-    "Roof",
-    "Ship",
-    "Sphere",
-    "StatedVolume",
-    "Survey",
-    "Switches",
-    "TableSpec",
-    "Tank",
-    "Top",
-]
 
 
 @dataclass(frozen=True)

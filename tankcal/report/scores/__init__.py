@@ -25,6 +25,9 @@ from tankcal.text.digits import NOTHING, fixed
 from tankcal.text.shipped import DEFAULT
 from tankcal.text.words import load_words
 
+__all__ = ["FILES", "ScoresPaper", "refuse_foreign", "write_scores"]
+
+
 _SHEET = {"sheet": True, "width": 11}
 MOST_PANELS, ACROSS, PANEL_IN = 9, 3, 1.75  # largest number of panels, columns, height
 MARKS = "osD^v<>PX*"  # of the methods in Youden's plot
@@ -427,8 +430,6 @@ class ScoresPaper(SavedPaper):
         text = fixed(value, decimals, self.marks)
         return text if sd is None else f"{text} ± {fixed(sd, decimals, self.marks)}"
 
-
-__all__ = ["FILES", "ScoresPaper", "refuse_foreign", "write_scores"]
 
 FILES = (FILE, WORKBOOK, PAGE)
 
