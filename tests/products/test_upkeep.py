@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import EXAMPLE
+from example_logs import Station, TrueTank, make_station, make_upright, write_station
 from numpy.testing import assert_allclose
 from station_years import draw_year, make_table
-from stations import Station, TrueTank, write_station
 
 from tankcal import cli
 from tankcal.products.quantity.table import TankTable, read_table
@@ -181,7 +181,7 @@ def record(tmp_path_factory):
     return place / "results" / "record.json"
 
 
-def make_station(folder, record, days, seed=7, **values):
+def write_logs(folder, record, days, seed=7, **values):
     """Folder of a station with the tank of a record, its logs divided into months."""
     former = read_table(record)
     tank = TrueTank()
@@ -214,7 +214,7 @@ def divide_by_month(folder):
 def test_months_with_state_equal_a_single_run(record, tmp_path, capsys, monkeypatch):
     """A year by months, with kept state, a run that is stopped, and a damaged file."""
     folder, state = tmp_path / "station", tmp_path / "state"
-    make_station(folder, record, 210)
+    write_logs(folder, record, 210)
     months, later = divide_by_month(folder), tmp_path / "later"
     later.mkdir()
     for files in list(months.values())[-2:]:
@@ -242,12 +242,83 @@ def test_months_with_state_equal_a_single_run(record, tmp_path, capsys, monkeypa
     assert not [path for path in state.iterdir() if path.suffix != ".npz"]
 
 
+def run_example(make, record, folder, days):
+    """(truth, saved upkeeps of its folders) of an example."""
+    truth = make(record, folder, days)
+    return truth, *(
+        run_twice(place)
+        for place in (folder, folder / "first", folder / "second")
+        if (place / "upkeep.toml").exists()
+    )
+
+
+def run_twice(folder):
+    """Saved upkeep of a folder; the second run takes its results from the state."""
+    out = folder.with_name(f"{folder.name}-results")
+    run = ["upkeep", str(folder), "--state", str(folder / "state"), "--out", str(out), "--quiet"]
+    assert cli.main(run) == 0
+    saved = (out / "upkeep.json").read_bytes()
+    if json.loads(saved)["mode"] == "improved":
+        run += ["--record", str(folder.with_name("table"))]
+    assert cli.main(run) == 0
+    assert (out / "upkeep.json").read_bytes() == saved
+    return json.loads(saved)
+
+
+@pytest.mark.slow
+def test_example_of_a_station(record, tmp_path, capsys):
+    """The shipped example, 400 days: table and meters within U, the leak named, months fail."""
+    truth, saved, second = run_example(make_station, record, tmp_path / "station", 400)
+    assert saved["mode"] == "improved"
+    assert saved["watch"]["alarm"] is None
+    whole = saved["deliveries"][-1]
+    former = read_table(record)
+    ends = np.array([whole["low_m"], whole["high_m"]]) - truth["zero_m"]
+    true = (1 + truth["scale"]) * np.diff(former.volume(ends))[0]
+    assert abs(whole["volume_m3"] - true) < whole["U_m3"] < 0.5 * whole["former_U_m3"]
+    for meter in saved["meters"]:
+        error = meter["deviation_percent"] - 100 * truth["meters"][meter["name"]]
+        assert abs(error) < 1.3 * meter["U_percent"]
+    assert second["rows"][0]["former_m3"] == saved["rows"][0]["volume_m3"]
+    assert "alarm" in second["reasons"]
+    alarm = (np.datetime64(second["watch"]["alarm"]) - np.datetime64("2025-01-06")).astype(int)
+    assert truth["leak_day"] < alarm < truth["leak_day"] + 10
+    assert second["watch"]["is_named"]
+    assert second["watch"]["suspects"][0]["kind"] == "leak"
+    verdicts = {month["month"]: month for month in second["months"]}
+    assert verdicts["2025-09"]["verdict"] == "pass"
+    for month in ("2025-12", "2026-01"):  # the loss goes on, and stays a loss
+        assert verdicts[month]["verdict"] == "fail"
+        assert abs(verdicts[month]["leak_l_h"] - 0.65) < 1.5 * verdicts[month]["U_l_h"]
+    assert "leak or another loss by time" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_example_of_an_upright_tank(tmp_path, capsys):
+    """The shipped example, 200 days: the loading rack is calibrated by the tank, within U."""
+    job = tmp_path / "strapping"
+    shutil.copytree(EXAMPLE.parent / "strapping", job)
+    assert cli.main(["run", str(job), "--no-papers", "--quiet"]) == 0
+    record = job / "results" / "record.json"
+    truth, saved = run_example(make_upright, record, tmp_path / "upright", 200)
+    meter = saved["meters"][0]
+    assert abs(meter["deviation_percent"] - 100 * truth["meters"]["rack"]) < meter["U_percent"]
+    assert meter["U_percent"] < 0.3 * meter["prior_percent"]
+    whole = saved["deliveries"][-1]
+    former = read_table(record)
+    ends = np.array([whole["low_m"], whole["high_m"]]) - truth["zero_m"]
+    true = (1 + truth["scale"]) * np.diff(former.volume(ends))[0]
+    assert abs(whole["volume_m3"] - true) < whole["U_m3"] <= whole["former_U_m3"]
+    assert saved["watch"]["alarm"] is None
+    capsys.readouterr()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("language", ["en", "es", "pt-BR"])
 def test_batch_lists_alarms(record, tmp_path, capsys, language):
     """Two tanks, of which one loses 0.757 L/h from day 30 on: the summary names its alarm."""
     for name, fault in (("valid", ""), ("leaking", "leak")):
-        make_station(tmp_path / "site" / name, record, 60, fault=fault, fault_day=30.0,
+        write_logs(tmp_path / "site" / name, record, 60, fault=fault, fault_day=30.0,
                      fault_size=0.757 * 3)  # fmt: skip
     out = tmp_path / "out"
     batch = ["batch", str(tmp_path / "site"), "--do", "upkeep", "--no-papers", "--out", str(out),
@@ -271,7 +342,7 @@ def test_batch_lists_alarms(record, tmp_path, capsys, language):
 def improved(record, tmp_path_factory):
     """Folder of a station whose levels move over half of the tank, and its new record."""
     place = tmp_path_factory.mktemp("improved")
-    make_station(place / "station", record, 60, sales_a_day=120, low_m3=6.0, load_m3=24.0)
+    write_logs(place / "station", record, 60, sales_a_day=120, low_m3=6.0, load_m3=24.0)
     (place / "station" / "meters.csv").write_text(
         "meter,factor,u_factor_ppm,certificate\n1,1,300,C-1\n2,1,300,C-2\n3,1,300,\n4,1,300,\n"
     )
@@ -341,7 +412,7 @@ def test_no_certificate_without_a_traceable_meter(improved, tmp_path, capsys):
 def station(record, tmp_path_factory):
     """Folder of a station with the tank of the example of rings, 40 days."""
     place = tmp_path_factory.mktemp("upkeep") / "station"
-    make_station(place, record, 40)
+    write_logs(place, record, 40)
     return place
 
 

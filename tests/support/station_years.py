@@ -7,7 +7,7 @@ and wear, layers follow each delivery, lines warm with the air of the hour, loss
 from dataclasses import dataclass
 
 import numpy as np
-from stations import TrueTank
+from example_logs import TrueTank
 
 from tankcal.products.quantity.table import TankTable
 from tankcal.products.upkeep.causes import PRIORS, YEAR_S, Meter, Operation, TableStock

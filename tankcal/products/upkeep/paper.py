@@ -20,6 +20,7 @@ _SPACE = "\N{NO-BREAK SPACE}"
 FILE, WORKBOOK = "upkeep.json", "upkeep.xlsx"
 DIGEST = 12  # printed digits of a SHA-256
 ROWS_SHOWN = 24  # rows of the table in the report
+LABELS_SHOWN = 7  # months named below the figure
 SMALLEST_W = 2.5  # |w| of a printed suspect, unless it is possible
 
 
@@ -281,7 +282,7 @@ def plot_months(paper):
         ax.errorbar(place, month["leak_l_h"], yerr=month["U_l_h"], color=colour, marker="o",
                     markersize=3, capsize=2, linewidth=0.9)  # fmt: skip
     ax.axhline(0, color=GREY, linewidth=0.7)
-    step = max(len(months) // 12, 1)
+    step = -(-len(months) // LABELS_SHOWN)
     ax.set_xticks(list(places)[::step], [month["month"] for month in months][::step])
     ax.set_ylabel(paper.word("texts.leak_axis"))
     return figure

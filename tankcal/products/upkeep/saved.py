@@ -93,13 +93,15 @@ class UpkeepMonth(Saved):
 
     month: str = key("year-month")
     steps: int = key("used steps")
-    leak_l_h: Finite = key("change of the loss by time in this month; positive: out of the tank")
+    leak_l_h: Finite = key("loss by time in this month; positive: out of the tank")
     U_l_h: Finite = key("expanded")
     detectable_l_h: float | None = key(
         "smallest rate detected with 95 % at 5 % of false alarms; null: not determined"
     )
     verdict: str = key(", ".join(VERDICTS))
-    throughput_percent: Finite = key("change of causes proportional to the metered volume")
+    throughput_percent: Finite = key(
+        "deviation of causes proportional to the metered volume from the mean of all months"
+    )
     U_percent: Finite = key("expanded")
 
 

@@ -13,7 +13,7 @@ from tankcal.messages import message
 from tankcal.products.settings import drop_blanks
 from tankcal.products.upkeep import saved
 from tankcal.products.upkeep.estimation import LEAST_RANGE, LEAST_STEPS, estimate
-from tankcal.products.upkeep.filtering import total_innovations, whiten_steps
+from tankcal.products.upkeep.filtering import whiten_steps
 from tankcal.products.upkeep.reading import SETTINGS
 from tankcal.products.upkeep.state import NO_STATE
 from tankcal.products.upkeep.steps import REASONS
@@ -24,6 +24,8 @@ from tankcal.record.texts import warnings_of
 WIDE = 0.005  # relative u of the former contents above which only deliveries are stated
 GLOBAL_TEST = 1e-3  # least probability of chi-square for an improved table
 SIR_LIMIT_L_H = 0.757  # 0.2 gal/h, the rate of inventory reconciliation (40 CFR 280.43)
+ONE_SIDED = 1.645  # standard deviations of the 95 % quantile of the usual loss
+WIDE_CHANGE = 1e3  # prior standard deviation of the change of a month, L/h or %
 ROWS_SHOWN = 4  # deliveries between fifths of the seen levels
 VARIANCE_RATIO = 2.0  # of observed and declared variances, beyond which a warning is given
 
@@ -61,9 +63,12 @@ def keep_up(inputs, state=NO_STATE):
     volume, factor = update_table(estimation, operation.stock, low, high)
     former_u = np.linalg.norm(table.factor_m3, axis=1)
     seen = (table.height_m >= low) & (table.height_m <= high)
+    watched = watch(estimation, sections["watch"]["false_alarm_per_year"] or 0.05, state)
     reasons = _refusals(estimation, table, low, high, former_u, seen, inputs.traceable)
+    if watched.alarm_s is not None:
+        reasons.append("alarm")
     mode = "improved"
-    if {"few_steps", "small_range", "global_test", "outliers"} & set(reasons):
+    if {"few_steps", "small_range", "global_test", "outliers", "alarm"} & set(reasons):
         mode = "watched"
     elif "wide_former" in reasons:
         mode = "deliveries"
@@ -73,12 +78,10 @@ def keep_up(inputs, state=NO_STATE):
     spread = k * table_scale * np.linalg.norm(factor, axis=1)
     seconds = np.append(0.0, np.cumsum(inputs.steps.seconds))
     start = inputs.steps.marks.time_ns[0]
-    watched = watch(estimation, sections["watch"]["false_alarm_per_year"] or 0.05, state)
 
     def day(at_s):
         return str(np.datetime64(int(start + at_s * 1e9), "ns").astype("datetime64[D]"))
 
-    names = {id(suspect) for suspect in watched.names}
     return saved.UpkeepFile(
         notice=sections["upkeep"]["notice"] or "",
         tank=table.tank,
@@ -112,7 +115,7 @@ def keep_up(inputs, state=NO_STATE):
             watched.is_provisional, watched.false_alarms, watched.largest,
             None if watched.alarm_s is None else day(watched.alarm_s), watched.is_named,
             [saved.UpkeepSuspect(cause.kind, cause.member, cause.unit, day(cause.start_s),
-                                 cause.size, cause.sd, cause.w, id(cause) in names)
+                                 cause.size, cause.sd, cause.w, cause in watched.names)
              for cause in watched.suspects[:8]],
         ),
         cleaning=[_count(log, kind, entry)
@@ -245,7 +248,11 @@ def _causes(estimation):
 
 
 def _months(estimation, start_ns, k, scale):
-    """Leak and throughput of each month, by the innovations."""
+    """Leak and throughput of each month, all months jointly with the constant causes.
+
+    The changes of all months are unknowns together, so that a loss that goes on is a loss in every
+    month, and no later month takes it for normal.
+    """
     steps, drift = estimation.steps, estimation.balance.drift
     ends = (steps.marks.time_ns[1:]).view("datetime64[ns]").astype("datetime64[M]")
     months = np.unique(ends)
@@ -253,16 +260,26 @@ def _months(estimation, start_ns, k, scale):
     leak = inside * (drift.seconds / 3.6e6)[:, None]
     through = inside * (drift.metered_m3.sum(axis=1) / 100)[:, None]
     white = whiten_steps(drift, np.hstack([leak, through])).rows
-    both = total_innovations(estimation.rows, estimation.is_used, white)
-    e, columns = both[:, 0], both[:, 1:]
-    information = np.maximum(np.sum(columns**2, axis=0), 1e-12)
-    sizes, sd = columns.T @ e / information, scale / np.sqrt(information)
-    result, count = [], len(months)
+    causes, count = estimation.balance.causes, len(months)
+    (place,) = causes.place("loss") if len(causes.place("loss")) else (None,)
+    # The loss by time is that of each month alone; its prior is used in the verdict.
+    rows = estimation.rows if place is None else np.delete(estimation.rows, 1 + place, axis=1)
+    changes, covariance = _fit_months(rows, white)
+    mean, spread = (0.0, 0.0) if place is None else (causes.mean[place], causes.sd[place])
+    # Throughput less the mean of all months, which is not separable from the meters.
+    centre = np.eye(2 * count)
+    if count > 1:
+        centre[count:, count:] -= 1 / count
+    sizes = centre @ changes + np.repeat([mean, 0.0], count)
+    variances = np.einsum("ij,jk,ik->i", centre, covariance, centre)
+    sd = scale * np.sqrt(variances)
+    usual = mean + ONE_SIDED * spread
+    result = []
     for i, month in enumerate(months):
         detectable = SIR_SD * sd[i]
         verdict = "inconclusive"
         if detectable <= SIR_LIMIT_L_H:
-            verdict = "fail" if sizes[i] > detectable / 2 else "pass"
+            verdict = "fail" if sizes[i] > usual + detectable / 2 else "pass"
         result.append(
             saved.UpkeepMonth(
                 str(month), int(np.sum(estimation.is_used & inside[:, i])), float(sizes[i]),
@@ -271,6 +288,19 @@ def _months(estimation, start_ns, k, scale):
             )
         )  # fmt: skip
     return result
+
+
+def _fit_months(rows, columns):
+    """Sizes (months,) and covariance (months, months) of the changes of all months.
+
+    rows: (n, 1 + c), columns: (n, months), whitened.
+    """
+    count = rows.shape[1] - 1
+    effects = np.hstack([rows[:, 1:], columns])
+    prior = np.append(np.ones(count), np.full(columns.shape[1], WIDE_CHANGE**-2))
+    inverse = np.linalg.inv(effects.T @ effects + np.diag(prior))
+    sizes = inverse @ (effects.T @ rows[:, 0])
+    return sizes[count:], inverse[count:, count:]
 
 
 def _count(log, kind, entry):

@@ -1,10 +1,17 @@
-"""Simulated fuel stations: a tank, sales, deliveries and a gauge, none of which is the model.
+"""Simulated everyday data: a fuel station, and an upright tank of a terminal.
 
-The volume below a level is integrated along a cylinder with rings of alternating radius, ends and a
-tilt. Sales are transactions, readings of the gauge are rows of a log.
+    python simulate.py station RECORD FOLDER [DAYS]
+    python simulate.py upright RECORD FOLDER [DAYS]
+
+The true tank has the table of the record, with a scale and a zero that differ by about U. Gauge,
+meters, tickets and temperatures have errors that are not the model of tankcal. From three quarters
+of the time on, the tank of the station loses 0.6 L/h. truth.json has the true values.
 """
 
+import json
+import sys
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -170,3 +177,147 @@ def write_station(folder, data, *, settings=""):
         '[levels]\nfiles = ["levels.csv"]\n\n[meters]\nfiles = ["meters.csv.log"]\n\n'
         '[deliveries]\nfiles = ["deliveries.csv"]\n' + settings
     )
+
+
+# ---- the examples
+
+
+class TableTank:
+    """True tank: the table of a record, with another scale and zero."""
+
+    def __init__(self, record, scale, zero_m):
+        capacity = json.loads(Path(record).read_text(encoding="utf-8"))["capacity"]
+        self.grid = np.array(capacity["height_m"]) + zero_m
+        self.volume = np.array(capacity["volume_m3"]) * (1 + scale)
+
+    below, level = TrueTank.below, TrueTank.level
+
+
+def write_months(folder, name, heading, rows):
+    """Write a log in a file for each month; rows are texts that begin with an ISO time."""
+    files = {}
+    for row in rows:
+        files.setdefault(row[:7], []).append(row)
+    for month, lines in files.items():
+        text = "\n".join([heading, *lines, ""])
+        (folder / f"{name}-{month}.csv").write_text(text, encoding="utf-8")
+
+
+def write_settings(folder, record, service, expansion, quantum_mm, meters, more=""):
+    """Write upkeep.toml, and meters.csv with the certificates {meter: u in ppm}."""
+    (folder / "upkeep.toml").write_text(
+        f'[upkeep]\nrecord = "{Path(record).as_posix()}"\ntimezone = "UTC"\n'
+        f'service = "{service}"\nnotice = "EXAMPLE"\n\n[liquid]\nexpansion_per_k = {expansion}\n'
+        f"base_c = 15\n\n[gauge]\nresolution_mm = {quantum_mm}\n{more}\n"
+        '[levels]\nfiles = ["levels-*.csv"]\n\n[meters]\nfiles = ["sales-*.csv"]\n\n'
+        '[deliveries]\nfiles = ["tickets-*.csv"]\n', encoding="utf-8",
+    )  # fmt: skip
+    rows = [f"{name},1,{u},C-{name}" for name, u in meters.items()]
+    text = "\n".join(["meter,factor,u_factor_ppm,certificate", *rows, ""])
+    (folder / "meters.csv").write_text(text, encoding="utf-8")
+
+
+def make_station(record, folder, days=730):
+    """Write the folders first and second: two years of a station, with a late leak.
+
+    The second year begins with the record ../table, which the upkeep of the first year writes.
+    """
+    rng = np.random.default_rng(51)
+    tank = TableTank(record, 6e-4, 0.0006)
+    factors = {name: 3e-4 * rng.normal() for name in "1234"}
+    station = Station(
+        days=days, tank=tank, meters=factors, ticket=8e-4, leak_l_h=0.05, gauge_zero=0.0008,
+        quantum=1e-4, period_s=300.0, sales_a_day=90, low_m3=6.0, load_m3=24.0, fault="leak",
+        fault_day=0.75 * days, fault_size=0.6,
+    )  # fmt: skip
+    data = station.run(rng)
+    time, level = data["levels"]
+    half = str(local_text(days // 2 * DAY_S))
+
+    def write_log(name, heading, rows):
+        rows = list(rows)
+        for part, chosen in (("first", [row for row in rows if row < half]),
+                             ("second", [row for row in rows if row >= half])):  # fmt: skip
+            (folder / part).mkdir(parents=True, exist_ok=True)
+            write_months(folder / part, name, heading, chosen)
+
+    write_log("levels", "time,level_mm,temperature_c", (
+        f"{at},{1000 * h:.1f},{c:.1f}" for at, h, c in
+        zip(local_text(time), level, 15 + 0 * time, strict=True)
+    ))  # fmt: skip
+    begin, end = (local_text([sale[i] for sale in data["sales"]]) for i in (0, 1))
+    write_log("sales", "time,begin,meter,volume_l", (
+        f"{e},{b},{sale[2]},{sale[3]:.2f}"
+        for b, e, sale in zip(begin, end, data["sales"], strict=True)
+    ))  # fmt: skip
+    texts = local_text([ticket[0] for ticket in data["tickets"]])
+    write_log("tickets", "time,volume_l", (
+        f"{at},{ticket[1]:.0f}" for at, ticket in zip(texts, data["tickets"], strict=True)
+    ))  # fmt: skip
+    for part, table in (("first", Path(record).resolve()), ("second", "../table")):
+        write_settings(folder / part, table, "station", 0, 0.1, dict.fromkeys(factors, 300))
+    return {"scale": 6e-4, "zero_m": 0.0006, "meters": factors, "leak_l_h": 0.6,
+            "leak_day": 0.75 * days}  # fmt: skip
+
+
+def make_upright(record, folder, days=365):
+    """Write a year of an upright tank: a loading rack, a receipt when the stock is low."""
+    rng = np.random.default_rng(52)
+    tank = TableTank(record, -2e-4, 0.001)
+    top = tank.grid[-1]
+    low, high = tank.below(0.2 * top), tank.below(0.9 * top)
+    expansion, rack, receipt = 0.00083, 6e-4, 1e-4
+    stock, flows, tickets, sales = high, [], [], []
+    for day in range(days):
+        if day % 7 < 5:  # loaded from 7 to 16 h
+            volume = (high - low) / 6 * rng.gamma(20, 1 / 20)
+            start = day * DAY_S + 7 * HOUR_S
+            flows.append((start, start + 9 * HOUR_S, -volume * (1 + rack)))
+            sales.append((start, start + 9 * HOUR_S, volume))
+            stock -= volume * (1 + rack)
+        if stock < low + (high - low) / 5:
+            volume, start = high - stock, day * DAY_S + 17 * HOUR_S
+            flows.append((start, start + 5 * HOUR_S, volume))
+            tickets.append((start + 5 * HOUR_S, volume * (1 - receipt)))
+            stock += volume
+    time = np.arange(0, days * DAY_S, 600.0)
+    begin, end, volume = np.array(flows).T
+    season = 18 + 8 * np.sin(2 * np.pi * (time / DAY_S - 110) / 365)
+    inside = high + Station._sum_flows(time, begin, end, volume)  # at 15 degC
+    warm = season + 0.15 * np.sin(2 * np.pi * time / DAY_S / 9)
+    level = tank.level(inside * (1 + expansion * (warm - 15)))
+    slow = 0.0003 * np.sin(2 * np.pi * time / DAY_S / 17 + 1) + 0.0012 + 6e-5 * level
+    read = np.round(1000 * (level + slow + 0.0004 * rng.normal(size=len(time))))
+    folder.mkdir(parents=True, exist_ok=True)
+    write_months(folder, "levels", "time,level_mm,temperature_c", (
+        f"{at},{h:.0f},{c:.2f}" for at, h, c in zip(local_text(time), read, season, strict=True)
+    ))  # fmt: skip
+
+    def season_at(seconds):
+        return np.interp(seconds, time, season)
+
+    def warmed(litres, seconds):
+        return 1000 * litres * (1 + expansion * (season_at(seconds) - 15))
+
+    write_months(folder, "sales", "time,begin,meter,volume_l,temperature_c", (
+        f"{local_text(e)},{local_text(b)},rack,{warmed(v, e):.0f},{season_at(e):.2f}"
+        for b, e, v in sales
+    ))  # fmt: skip
+    write_months(folder, "tickets", "time,volume_l,temperature_c", (
+        f"{local_text(at)},{warmed(v, at):.0f},{season_at(at):.2f}" for at, v in tickets
+    ))  # fmt: skip
+    write_settings(folder, Path(record).resolve(), "terminal", expansion, 1, {"rack": 1000})
+    return {"scale": -2e-4, "zero_m": 0.001, "meters": {"rack": rack}}
+
+
+def main():
+    """Write the logs of an example and truth.json beside them."""
+    kind, record, folder = sys.argv[1:4]
+    make = {"station": make_station, "upright": make_upright}[kind]
+    truth = make(record, Path(folder), *map(int, sys.argv[4:5]))
+    text = json.dumps(truth, indent=1) + "\n"
+    (Path(folder) / "truth.json").write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
