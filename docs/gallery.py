@@ -51,6 +51,7 @@ OTHERS = {  # folders without a capacity table of their own, and their pages
     "plan-tangents": "planning",
     "plan-triangulation": "planning",
     "plan-wall-hits": "planning",
+    "upkeep": "upkeep",
 }
 HEAD = """# Gallery
 
