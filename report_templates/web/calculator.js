@@ -111,10 +111,12 @@ function whenDipChanges(tell) {
     const [low, high] = [heightAt(below), heightAt(above)];
     const volume = volumeAt(above) - volumeAt(below);
     const stated = statedBetween(low, high);
-    // Down to the empty tank, a delivery is the volume at its upper dip, with the U of this volume.
-    const isWhole = volumeAt(below) === 0;
-    const { u, k } = isWhole ? uncertaintyAt(above) : uncertaintyBetween(low, high);
-    const U = stated ? stated.U : isWhole ? uncertaintyAt(above).U : k * u;
+    // Down to the empty tank, errors of the two dips cancel in part only: the larger U is stated.
+    const between = uncertaintyBetween(low, high);
+    const whole = uncertaintyAt(above);
+    const isWhole = volumeAt(below) === 0 && whole.U >= between.k * between.u;
+    const { u, k } = isWhole ? whole : between;
+    const U = stated ? stated.U : isWhole ? whole.U : k * u;
     const places = U > 0 ? decimalsOf(U) : data.least;
     const pairs = stated ? [] : [standardU(u)];
     if (volume > 0) pairs.push(["relative_U", `${fixed((100 * U) / volume, 3)} %`]);

@@ -195,9 +195,8 @@ def stated_delivery(table, simulation, low_m, high_m):
     """Volume between two dips with its printed U (`capacity.Quantity`), without the readings.
 
     A delivery that was not simulated has the U of the law of propagation, and its interval states
-    this. Down to the empty tank, such a delivery is the volume at its upper dip, and has the U of
-    that volume: the law of propagation would let errors cancel that do not
-    (docs/studies/propagation.md).
+    this. Down to the empty tank, such a delivery has at least the U of the volume at its upper dip:
+    the law of propagation lets errors cancel that do not (docs/studies/propagation.md).
 
     Parameters
     ----------
@@ -223,7 +222,9 @@ def stated_delivery(table, simulation, low_m, high_m):
     is_same &= np.isclose(delivered.high_m, high_m, rtol=0, atol=SAME_M)
     if not np.any(is_same):
         if quantity.value_m3 == table.at(high_m).value_m3:
-            return stated_volume(table, simulation.intervals(table), high_m)
+            volume = stated_volume(table, simulation.intervals(table), high_m)
+            if volume.U_m3 >= quantity.U_m3:
+                return volume
         return replace(quantity, interval="gum_not_simulated")
     place, of_delivered = int(np.argmax(is_same)), simulation.of_delivered
     if of_delivered.by_gum[place]:

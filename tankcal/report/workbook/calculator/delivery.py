@@ -108,10 +108,6 @@ def combining(table, label):
     ]
 
 
-# A delivery down to the empty tank is the volume at its upper dip, and has the U of that volume.
-_IS_WHOLE = "[low_dip_volume]=0"
-
-
 def _find_at_high(name):
     """Return the formula of a column of the table at the upper dip: the row with the larger U."""
     row, after = "[high_dip_row]", "[high_dip_next]"
@@ -120,8 +116,13 @@ def _find_at_high(name):
 
 
 def _choose_formula(of_delivery, of_volume):
-    """Return the formula of a value of a delivery, or of its volume if the tank is emptied."""
-    return if_number("[delivery_k]", f"IF({_IS_WHOLE},{of_volume},{of_delivery})")
+    """Return the formula of a value of a delivery, or of its volume if that U is larger.
+
+    Down to the empty tank, errors of the two dips cancel in part only (docs/studies/propagation.md).
+    """
+    larger = f"{_find_at_high('U')}>=[delivery_k]*[delivery_u]"
+    is_whole = f"AND([low_dip_volume]=0,{larger})"
+    return if_number("[delivery_k]", f"IF({is_whole},{of_volume},{of_delivery})")
 
 
 def results(table, words):
@@ -134,7 +135,8 @@ def results(table, words):
     if table.has_interval:
         simulated = quoted(words["intervals"]["monte_carlo"])
         k_of_volume = f'IF({_find_at_high("interval")}="{simulated}",{_NONE},{k_of_volume})'
-    if u != NOTHING and table.volume_m3[table.low] == 0:
+    is_empty = table.volume_m3[table.low] == 0
+    if u != NOTHING and is_empty and table.U_m3[table.at] >= U:
         U, u, dof = table.U_m3[table.at], table.capacity["u_m3"][table.at], NOTHING
         k = NOTHING if table.k[table.at] is None else table.k[table.at]
     delivered = "[high_dip_volume]-[low_dip_volume]"
