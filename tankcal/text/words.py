@@ -136,7 +136,8 @@ def translate_record(words, record):
     return {
         **record,
         "warnings": [
-            _translate_file(words, _translate_row(words, row, "text")) for row in record["warnings"]
+            _translate_file(words, _name_keys(words, _translate_row(words, row, "text")))
+            for row in record["warnings"]
         ],
         "corrections": [_translate_row(words, row, "formula", "formula_") for row in corrections],
         "adjustment": adjustment and _adjustment_in_language(words, adjustment),
@@ -172,6 +173,17 @@ def _translate_row(words, row, key, of=""):
     """Return a row with a translated text in `key`; rows of older records have no code."""
     code, values = row.get(f"{of}code"), row.get(f"{of}values", {})
     return {**row, key: message_sentence(words, row[key], code, values)}
+
+
+def _name_keys(words, row):
+    """Return a warning that names inputs and entries of the certificate, in place of their keys."""
+    text, values = row["text"], row.get("values", {})
+    labels = words.get("labels", {}) | {"number": words.get("page", {}).get("number", "number")}
+    for key, names in (("inputs", words.get("inputs", {})), ("entries", labels)):
+        if isinstance(keys := values.get(key), list):
+            named = "; ".join(names.get(name, name) for name in keys)
+            text = text.replace(", ".join(keys), named)
+    return {**row, "text": text}
 
 
 def _translate_file(words, row):

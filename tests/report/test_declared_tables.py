@@ -27,7 +27,6 @@ from tankcal.text.words import load_words
 ADDED = Column("half_m", "m", decimals=3, heading="tolerance_m3", sheet=True, csv="half_m")
 WORDS = load_words("en")
 OF_THE_WORKBOOK = (  # alone
-    tank.CHOICES,
     tank.SHELL,
     tank.DEVIATIONS,
     survey.INSTRUMENTS,

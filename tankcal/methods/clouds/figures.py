@@ -110,11 +110,14 @@ def facts(paper):
         "cloud_without_U": part["without_U_m3"],
         "cloud_shared_u": part["shared_u_m3"],
     }
-    chi2 = paper.number(clouds["registration_chi2"], decimals=1)
-    tied = f"{chi2} / {paper.number(dof, decimals=0)}" if clouds["targets"] else None
+    tied = clouds["targets"] and paper.word(
+        "texts.registration_test",
+        chi_square=paper.number(clouds["registration_chi2"], decimals=1),
+        dof=paper.number(dof, decimals=0),
+    )
     return paper.facts(
         [(key, paper.number(value, "m3", u=value or None)) for key, value in volumes.items()]
-        + [("cloud_registration", tied), *_facts_of_inside(paper)]
+        + [("cloud_registration", tied or None), *_facts_of_inside(paper)]
     )
 
 

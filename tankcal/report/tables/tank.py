@@ -2,7 +2,7 @@
 
 from tankcal.report.tables.table import Column, Table
 from tankcal.text.digits import LITRE_DECIMALS
-from tankcal.text.words import choice_sentence, sentence
+from tankcal.text.words import sentence
 
 TO_ITS_SD = {"decimals": 4}  # values in the workbook if no row has a standard deviation
 SD = {"decimals": 2, "most": 3}  # standard deviations in mm in the workbook
@@ -232,15 +232,7 @@ DEADWOOD = Table(
 )  # fmt: skip
 
 
-# ---- choices, warnings, files and programs
-
-
-def _value_of_choice(paper, row):
-    """Return the value of a choice as text; lists are joined by commas."""
-    value = row["value"]
-    if isinstance(value, list | tuple):
-        return ", ".join(str(item) for item in value)
-    return "" if value is None else str(value)
+# ---- warnings, files and programs
 
 
 def _place_of_warning(paper, row):
@@ -248,17 +240,6 @@ def _place_of_warning(paper, row):
     row_text = row["row"] and paper.words["workbook"]["texts"]["row"].format(row=row["row"])
     return ", ".join(part for part in (row_text, row["column"]) if part)
 
-
-CHOICES = Table(
-    "choices",
-    (
-        Column("code", sheet="code", width=24),
-        Column("value", text=_value_of_choice, sheet="value", width=24),
-        Column("meaning", text=lambda paper, row: choice_sentence(paper.words, row),
-               sheet="meaning", width=80),
-    ),
-    rows=lambda record: record["choices"],
-)  # fmt: skip
 
 WARNINGS = Table(
     "warnings",

@@ -11,12 +11,14 @@ from tankcal.report.workbook.look import Column, number_format
 from tankcal.report.workbook.sections import (
     HEAD_ROW,
     CellTable,
+    Sentences,
     SheetContent,
     cell_table,
     columns_of,
     write_sheet,
 )
 from tankcal.text.digits import decimals_of
+from tankcal.text.words import choice_sentence
 
 _INSIDE_WIDTHS = (50, 16, 16, 16, 16)  # widths of the columns of the sheet inside, letters
 
@@ -95,7 +97,6 @@ def corrections_sheet(book, record):
 def provenance_sheet(book, record):
     """Write choices, warnings, input files and versions of programs."""
     declared = (
-        ("choices", "choices", tank.CHOICES),
         ("warnings", "warnings", tank.WARNINGS),
         ("files", "input_files", tank.FILES),
         ("programs", "programs", tank.PROGRAMS),
@@ -104,7 +105,9 @@ def provenance_sheet(book, record):
         declared += (("equipment", "equipment", tank.EQUIPMENT),)
     if record["job"].get("seals"):
         declared += (("seals", "seals", tank.SEALS),)
-    sections = [
+    choices = [choice_sentence(book.words, choice) for choice in record["choices"]]
+    sections = [Sentences(choices, title=book.word("headings.choices"))]
+    sections += [
         cell_table(book, table, name=name, title=book.word(f"headings.{title}"))
         for title, name, table in declared
     ]

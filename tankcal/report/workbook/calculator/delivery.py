@@ -118,7 +118,7 @@ def _find_at_high(name):
 def _choose_formula(of_delivery, of_volume):
     """Return the formula of a value of a delivery, or of its volume if that U is larger.
 
-    Down to the empty tank, errors of the two dips cancel in part only (docs/studies/propagation.md).
+    Down to the empty tank, errors of two dips cancel in part only (docs/studies/propagation.md).
     """
     larger = f"{_find_at_high('U')}>=[delivery_k]*[delivery_u]"
     is_whole = f"AND([low_dip_volume]=0,{larger})"
