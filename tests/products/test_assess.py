@@ -407,6 +407,96 @@ def test_a_wrong_digit_of_a_foreign_table_is_found(tmp_path):
     assert codes_of(foreign(tmp_path, rows=rows)) == {"assess_table"}
 
 
+# As laboratories of Brazil and Mexico write, with tables in layouts of their own.
+PORTUGUESE = [
+    "METROTANQUE Serviços de Metrologia Ltda.  CERTIFICADO Nº MT-0457/2025  Página 1/2",
+    "Contratante: Distribuidora Exemplo, Santos/SP   Objeto: tanque vertical TQ-4501",
+    "Local da calibração: Terminal de Santos   Data da calibração: 12/03/2025",
+    "Procedimento: PT-012, cintamento externo   Condições ambientais: costado a 27,4 °C",
+    "Padrões utilizados: trena TR-07, certificado RBC 1234/2024, validade: 05/2026",
+    "Capacidade na altura de 5,99 m: 611,41 m³ ± 0,61 m³. Temperatura de referência: 20 °C.",
+    "A incerteza expandida é a incerteza padrão combinada multiplicada por k = 2,00, que para uma",
+    "distribuição normal corresponde a uma probabilidade de abrangência de aproximadamente 95 %.",
+    "Os resultados referem-se exclusivamente ao item calibrado. A reprodução só é permitida na",
+    "íntegra. Os resultados são rastreáveis ao SI. Signatário autorizado: Eng. José Exemplo",
+]
+SPANISH = [
+    "AFOROS Y METROLOGÍA S.A. de C.V., acreditación V-00 vigente   Informe núm. 118   Hoja 1 de 3",
+    "CERTIFICADO DE CALIBRACIÓN   Solicitante: Refinadora Ejemplo   Tanque: TV-2003",
+    "Lugar: patio de tanques, Veracruz   Fecha de calibración: 2025-02-17",
+    "Método: triangulación óptica interna   Condiciones: temperatura ambiente 31 °C",
+    "Patrones: estación total trazable al CENAM, certificado CNM-CC-740-111/2024",
+    "Referida a 20 °C. Volumen total: 611.41 m³, con una incertidumbre expandida U = 0.55 m³, k = 2",
+    "Este informe solo ampara al tanque descrito y no debe reproducirse parcialmente.",
+    "Aprobó: Ing. María Ejemplo, signataria autorizada",
+]
+SECTION_M2 = 102.07  # area of both tanks
+
+
+def wide_page():
+    """A table of decimetres by centimetres, in litres with a point between thousands."""
+    cells = [["dm", *map(str, range(10))]]
+    cells += [
+        [
+            str(d),
+            *(f"{round(SECTION_M2 * (10 * d + c) * 10):,}".replace(",", ".") for c in range(10)),
+        ]
+        for d in range(60)
+    ]
+    return [
+        (40 + 48 * k, 800 - 12 * row, cell)
+        for row, line in enumerate(cells)
+        for k, cell in enumerate(line)
+    ]
+
+
+def block_pages():
+    """A table in two blocks of columns, each of which continues on the next page."""
+    pages = []
+    for page in range(2):
+        words = [
+            (40 + 80 * k, 800, name) for k, name in enumerate(["Altura (m)", "Volumen (m3)"] * 2)
+        ]
+        for line in range(50):
+            for block in range(2):
+                height = (100 * block + 50 * page + line) / 100
+                words += [(40 + 160 * block, 788 - 12 * line, f"{height:.2f}")]
+                words += [(120 + 160 * block, 788 - 12 * line, f"{SECTION_M2 * height:.3f}")]
+        pages.append(words)
+    return pages
+
+
+def in_language(lines, pages, path, *more, dropped=""):
+    kept = [line for line in lines if not dropped or dropped not in line]
+    head = [(40, 800 - 14 * k, line) for k, line in enumerate([*kept, *more])]
+    return assess(write_pdf([head, *pages], path), DAY)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("lines", "pages"), [(PORTUGUESE, [wide_page()]), (SPANISH, block_pages())], ids=["pt", "es"]
+)
+def test_a_complete_certificate_in_other_words_has_no_finding(lines, pages, tmp_path):
+    assert in_language(lines, pages, tmp_path / "foreign.pdf").findings == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("more", "dropped", "code"),
+    [
+        (("O tanque atende ao Regulamento Técnico.",), "", "assess_claim"),
+        (("Estado do costado: bom. Próxima", "calibração: março de 2035"), "", "assess_interval"),
+        (("Na altura de 3 m: U = 0,5634 m³",), "", "assess_digits"),
+        ((), "Contratante", "assess_not_found"),
+        ((), "Local da", "assess_not_found"),
+        ((), "referem-se exclusivamente", "assess_not_found"),
+    ],
+)
+def test_a_planted_line_of_a_portuguese_certificate_is_found(tmp_path, more, dropped, code):
+    path = tmp_path / "foreign.pdf"
+    assert codes_of(in_language(PORTUGUESE, [wide_page()], path, *more, dropped=dropped)) == {code}
+
+
 # ---- words, sources, documents
 
 
@@ -430,6 +520,7 @@ def test_claims_and_intervals_are_found_in_three_languages():
     assert not find_claim("Measured in accordance with ISO 7507-1")
     assert not find_interval("Recalibration in 10 years by Portaria 103/2022")
     assert not find_interval("Next calibration in 5 years, as the customer requested")
+    assert not find_interval("Trena TR-07, certificado RBC 1234/2024, validade: 05/2026")
 
 
 def test_only_clauses_that_were_read_are_cited_as_read():

@@ -4,7 +4,9 @@
 def write_pdf(pages, path):
     """Write a PDF with words (x, y, text) on each page without a library; returns the path."""
     parts = ["<< /Type /Catalog /Pages 2 0 R >>", None]
-    parts.append("<< /Type /Font /Subtype /Type1 /BaseFont /Helvetica >>")
+    parts.append(
+        "<< /Type /Font /Subtype /Type1 /BaseFont /Helvetica /Encoding /WinAnsiEncoding >>"
+    )
     kids = []
     for words in pages:
         stream = "".join(f"BT /F 8 Tf 1 0 0 1 {x} {y} Tm ({t}) Tj ET\n" for x, y, t in words)

@@ -204,7 +204,11 @@ def test_record_is_written_in_language_of_its_reader(result):
     (scale,) = (one["formula_values"]["scale"] for one in record["corrections"]
                 if one["code"] == "temperature")  # fmt: skip
     assert thermal["formula"] == f"comprimentos vezes {scale:.8f}".replace(".", ",")
-    assert translate_record(load_words(DEFAULT), record) == record
+    english = translate_record(load_words(DEFAULT), record)
+    assert english | {"warnings": record["warnings"]} == record
+    (undeclared,) = (one for one in english["warnings"] if one["code"] == "undeclared")
+    assert "Tilt of the axis" in undeclared["text"]
+    assert "tilt" not in undeclared["text"]
 
 
 def test_a_record_without_codes_keeps_its_texts(result):

@@ -50,11 +50,10 @@ def check_claims(evidence):
 
 
 def check_interval(evidence):
-    """Yield a line that states an interval of calibration without its reason."""
-    for page, lines in enumerate(evidence.certificate.lines, 1):
-        for line in lines:
-            if words := find_interval(line):
-                yield Finding(interval_text(words), MINOR, evidence.certificate.name, page)
+    """Yield an interval of calibration that a page states without its reason."""
+    for page, text in enumerate(evidence.certificate.pages, 1):
+        if words := find_interval(" ".join(text.split())):
+            yield Finding(interval_text(words), MINOR, evidence.certificate.name, page)
 
 
 def check_digits(evidence):

@@ -37,10 +37,18 @@ INTERVALS = re.compile(
 )
 # A rule or the customer's request, which permits an interval.
 _REASONS = re.compile(
-    r"customer|request|regulation|order|law|decree|directive|cliente|pedido|solicit|portaria|lei"
-    r"|decreto|resolu|norma|arrêté|demande|kunde|verordnung|gesetz|richiesta|(article|artigo) \d",
+    r"customer|request|regulation|\b(order|law|lei|ley|norma|loi)\b|decree|directive|cliente|pedido"
+    r"|solicit|portaria|decreto|resolu[cç]|arrêté|demande|kunde|verordnung|gesetz|richiesta"
+    r"|(article|artigo) \d",
     re.IGNORECASE,
 )
+# What may be valid until a day without being the tank: standards, instruments, an accreditation.
+_OTHER_VALIDITY = re.compile(
+    r"padr(ão|ões)|patr(ón|ones)|standards?\b|instrument|equip|trena|cinta|tape|scanner|estaç"
+    r"|estación|station|accredit|acredit|akkredit|certificad[oa]s? (rbc|n[.º°o])|étalon",
+    re.IGNORECASE,
+)
+_NEAR, _REASON_NEAR = 60, 120  # letters around an interval in which its subject or reason is
 # Names of the requirements of a certificate whose words are searched, with their patterns.
 LABELS = {
     "title": r"certificate|certificado|certificat|kalibrierschein|certificato|barème|zertifikat",
@@ -49,7 +57,7 @@ LABELS = {
     "laboratory": r"laborator|issued by|emitid|émetteur|expedid|aussteller|company|empresa|ltd|gmbh"
     r"|s\.?a\.?\b",
     "customer": r"customer|client|owner|propriet|propietari|kunde|auftraggeber|cliente|titular"
-    r"|détenteur",
+    r"|détenteur|solicitante|contratante|requerente|interessado|applicant|requested by",
     "place": r"place|location|site\b|local|lugar|ubicaci|lieu|\bort\b|standort|luogo|terminal",
     "method": r"method|método|méthode|verfahren|metodo|procedure|procedimento|procedimiento"
     r"|ISO 7507|API MPMS",
@@ -62,9 +70,9 @@ LABELS = {
     r"|\bU\s*=",
     "coverage": r"\bk\s*=|coverage|abrang|cobertura|élargissement|erweiterungsfaktor|copertura",
     "reference": r"reference temperature|temperatura de refer|température de référence"
-    r"|bezugstemperatur|temperatura di riferimento|(at|a|à|bei|zu) (15|20|60)(\.0|,0)?\s*°",
-    "only_items": r"(only|solely|apenas|somente|únicamente|solamente|sólo|solo|uniquement"
-    r"|ausschließlich|esclusivamente)",
+    r"|bezugstemperatur|temperatura di riferimento|(at|to|a|à|bei|zu) (15|20|60)([.,]0+)?\s*°",
+    "only_items": r"(only|solely|exclusively|apenas|somente|únicamente|solamente|sólo|solo"
+    r"|exclusiva\w*|uniquement|ausschließlich|esclusivamente)",
     "copy": r"reprodu|copied|copia|cópia|copiad|vervielfältig|riprodu",
     "authorisation": r"authori[sz]|approv|sign|autoriz|aprov|aprob|assinat|firma|signat"
     r"|unterschrift|verantwortlich|responsible|responsável|responsable",
@@ -81,8 +89,14 @@ def find_claim(text):
 
 def find_interval(text):
     """Words of a text that state an interval of calibration without its reason; ""."""
-    match = INTERVALS.search(text)
-    return match[0] if match and not _REASONS.search(text) else ""
+    for match in INTERVALS.finditer(text):
+        subject, reason = (
+            text[max(0, match.start() - near) : match.end() + near]
+            for near in (_NEAR, _REASON_NEAR)
+        )
+        if not (_OTHER_VALIDITY.search(subject) or _REASONS.search(reason)):
+            return match[0]
+    return ""
 
 
 def claim_text(words):

@@ -24,6 +24,7 @@ from tankcal.job.sheets import is_read
 from tankcal.job.tables import MAX_COLUMNS, read_bytes, shown, too_many_columns
 from tankcal.messages import message
 from tankcal.products.linter.headings import heading_of, is_unit
+from tankcal.products.linter.wide import are_even, read_label
 from tankcal.record import FORMAT, altered_since, version_of
 from tankcal.text.delimited import find_separator, split_cells
 
@@ -207,6 +208,7 @@ _GROUPED = re.compile(r"\d{1,3}(?: \d{3})+(?:[.,]\d+)?")
 _MARKS = "*\u2020\u2021"  # footnote marks
 _MOSTLY = 0.6
 _LINES_OF_HEADING = 3
+_FEWEST_PARTS = 9  # parts of a height in the heading of a wide table, such as 0 to 9 cm
 _HALF_OF_LINES = 0.5  # share of the lines
 
 
@@ -279,11 +281,15 @@ def is_data(words):
 
 
 def _is_heading(words):
-    """Whether a line has headings of heights and volumes."""
+    """Whether a line has headings of heights and volumes, or of heights and their parts."""
     if len(words) < 2:  # a line of prose is one cell
         return False
     roles = [heading_of(word.text).role for word in words]
-    return "volume" in roles and ("height" in roles or "ullage" in roles)
+    has_heights = "height" in roles or "ullage" in roles
+    labels = [read_label(word.text) for word in words[1:]]
+    if len(labels) >= _FEWEST_PARTS and None not in labels and are_even(labels):
+        return has_heights or is_unit(words[0].text)
+    return "volume" in roles and has_heights
 
 
 def _rows_by_page(section):

@@ -139,6 +139,9 @@ def _table(grid, blocks, numbers, log):
     orders = [by_column]
     if len(numbers) > 1 or blocks[0].wide is not None:
         orders.append([item for page in cells for row in _rows_of_page(page) for item in row])
+        longest = max(len(page) for page in cells)
+        columns = [page[k] for k in range(longest) for page in cells if k < len(page)]
+        orders.append([item for column in columns for item in column])  # through all pages
     style = style_of([[item[3] for item in by_column], [item[4] for item in by_column]])
     first = blocks[0].pairs[numbers[0]]
     heights, rows = [item[3] for item in by_column], [item[0] for item in by_column]

@@ -75,13 +75,13 @@ def wide_heading(rows, index, above):
     start = 2 if has_volume else 1
     labels = []
     for cell in cells[start:]:
-        label = _label(cell)
+        label = read_label(cell)
         if label is None:
             break
         labels.append(label)
     if has_volume and labels:
         labels.insert(0, (0.0, labels[0][1]))
-    if not _is_even(labels) or not _has_rows(rows, index, len(labels)):
+    if not are_even(labels) or not _has_rows(rows, index, len(labels)):
         return None
     units = [unit for _, unit in labels if unit is not None]
     named = units[-1] if units else None
@@ -118,7 +118,7 @@ def _volume_heading(cells, above):
     return Heading("", "volume", title_unit(above))
 
 
-def _label(cell):
+def read_label(cell):
     """(number, size of its unit or None) of the label of a column, or None."""
     if isinstance(cell, int | float) and not isinstance(cell, bool):
         return float(cell), None
@@ -136,7 +136,7 @@ def _label(cell):
     return None if size is None else (value, size)
 
 
-def _is_even(labels):
+def are_even(labels):
     """Whether labels rise by even steps from 0 or from their first step."""
     values = [value for value, _ in labels]
     has_units = any(unit is not None for _, unit in labels[1:])
