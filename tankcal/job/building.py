@@ -26,7 +26,7 @@ from tankcal.job.fields import is_blank
 from tankcal.job.folder import MAX_SETTINGS_BYTES
 from tankcal.job.folder import read_register as parse_register
 from tankcal.job.model.settings import Equipment, NextVerification, Overruling, Seal
-from tankcal.job.rule_files import find_rule
+from tankcal.job.rule_files import find_rule, tell_layout
 from tankcal.job.tables import (
     REGISTERS,
     SURVEY_TABLES,
@@ -236,10 +236,13 @@ def _attached(raw, values, log):
     """Read the files beside the settings; values is None if the settings are unreadable."""
     mesh = rule = None
     if values is not None:
-        mesh, rule = values["mesh"]["file"], values["table"]["rule"]
+        mesh, name = values["mesh"]["file"], values["table"]["rule"]
+        rule = None if name is None else find_rule(raw, name, log)
+        if rule is not None:
+            tell_layout(raw, values, rule[0], log)
     return Attached(
         None if mesh is None else read_mesh_file(raw.folder, mesh, log),
-        None if rule is None else find_rule(raw, rule, log),
+        rule,
         (None, None) if values is None else read_next_verification(raw, values, log),
     )
 

@@ -19,6 +19,7 @@ from tankcal.tank.rules.model import (
     DEVIATION_OF,
     FROM_LEVEL,
     GUARDS,
+    LAYOUT,
     PERIOD_OF,
     PLATE,
     RELATIVE_TO,
@@ -58,6 +59,7 @@ RULE = (
     positive("largest_capacity_m3", "largest tank it is for", 1e9),
     Field("statements", "names", "sentences that it requires in a certificate, in its language"),
     Field("plate", "names", "entries of the identification plate that it requires, in their order"),
+    Field("layout", "names", "layouts that it requires of the table"),
 )
 _SHARED = (Field("tanks", "names", "kinds of tank that it is for"), *SOURCE)
 _PERCENT = positive("limit_percent", "limit in percent", 100)
@@ -154,7 +156,8 @@ class RuleFiles:
                     part=part,
                 )
                 log.problem(file, expected, row, f"[{section}]")
-        self._check_plate(file, head, rows.get("rule"), log)
+        for key, known in (("plate", PLATE), ("layout", LAYOUT)):
+            _tell_unknown_entries(file, key, head.get(key), known, rows.get("rule"), log)
         if len(log.problems) == problems_before and not limits:
             expected = message(
                 "no_limits",
@@ -172,19 +175,6 @@ class RuleFiles:
             values["clause"] = values["clause"] or ": ".join(cited)
         head["remark"] = head["remark"] or ""
         return self.make(head, limits, file)
-
-    def _check_plate(self, file, head, row, log):
-        """Report unknown entries of the identification plate."""
-        for entry in head.get("plate") or ():
-            if entry not in PLATE:
-                expected = message(
-                    "unknown_plate_entry",
-                    "found {entry!r}; expected some of {entries}{hint}",
-                    entry=entry,
-                    entries=[*PLATE],
-                    hint=nearest(entry, PLATE),
-                )
-                log.problem(file, expected, row, "rule.plate")
 
     def _expect_sections(self, part):
         """Message that lists the sections beside an unknown one."""
@@ -221,6 +211,34 @@ class RuleFiles:
         missing = message("no_rule_file_there", "no such file: {file}", file=name)
         _tell_unknown("--rule", None, None, name, missing, self.names(), log)
         return None
+
+
+def _tell_unknown_entries(file, key, entries, known, row, log):
+    """Report unknown entries of the identification plate or of the layout."""
+    for entry in entries or ():
+        if entry not in known:
+            expected = message(
+                "unknown_rule_entry",
+                "found {entry!r}; expected some of {entries}{hint}",
+                entry=entry,
+                entries=[*known],
+                hint=nearest(entry, known),
+            )
+            log.problem(file, expected, row, f"rule.{key}")
+
+
+def tell_layout(raw, values, rule, log):
+    """Report settings of [table] that differ from the layout that a rule requires."""
+    for key, expected in (LAYOUT[layout] for layout in rule.layout):
+        if values["table"][key] != expected:
+            differs = message(
+                "layout_of_rule",
+                "the rule {rule} requires {expected}",
+                rule=rule.name,
+                expected=str(expected).lower() if expected is True else expected,
+            )
+            entry = raw.settings["table"].get(key)
+            log.problem(raw.settings_file, differs, entry and entry.row, f"table.{key}")
 
 
 def _tell_quotation(file, section, values, keys, log):
@@ -390,6 +408,7 @@ def _make_rule(head, limits, file):
         largest_capacity_m3=head["largest_capacity_m3"],
         statements=head["statements"] or (),
         plate=head["plate"] or (),
+        layout=head["layout"] or (),
         uncertainty=tuple(
             UncertaintyLimit(
                 of=values["of"],

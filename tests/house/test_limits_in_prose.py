@@ -1176,11 +1176,27 @@ RULES = [
     ("docs/decision-rules.md", "; alcohol () % |", "france_2003_alcohol"),
     (
         "docs/decision-rules.md",
-        "from the former one: () % at the top and of the whole range",
+        "new table against the former: () % at the top and of the range",
         "france_2020_recalibration",
     ),
     ("docs/decision-rules.md", "of at least 500 mm: () % of the capacity", "norway_2007"),
+    ("docs/decision-rules.md", "calibrated zone of tankers: () %;", "france_2003_rail_tankers"),
+    ("docs/decision-rules.md", "calibrated zone of tankers: () %;", "france_2003_road_tankers"),
+    (
+        "docs/decision-rules.md",
+        "deviation of the volumes: () % vertical, () % horizontal; twice",
+        "germany_2014",
+    ),
+    ("docs/decision-rules.md", "of the volumes of ships' tanks: () %;", "eu_71_349"),
 ]
+
+
+def test_periods_of_tankers_in_the_text():
+    printed = figures_of("docs/decision-rules.md", "; at most () and () years | yes: articles 32")
+    names = ("france_2003_rail_tankers", "france_2003_road_tankers")
+    files = (ROOT / f"tankcal/job/rule_tables/{name}.toml" for name in names)
+    years = [tomllib.loads(file.read_text("utf-8"))["period"]["all"]["years"] for file in files]
+    assert [float(text) for text in printed] == years
 
 
 @pytest.mark.parametrize(("page", "sentence", "name"), RULES, ids=lambda item: "")

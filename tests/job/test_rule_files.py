@@ -166,6 +166,25 @@ def test_problems_of_a_house_rule_come_with_those_of_the_job(tmp_path, form):
 
 
 @pytest.mark.parametrize("form", FORMS)
+def test_the_layout_that_a_rule_requires_is_asked_for(tmp_path, form):
+    text = OWN.replace("[uncertainty.step]", 'layout = ["centimetres"]\n\n[uncertainty.step]')
+    parts = job_with("house.toml", text)
+    for name in ("without", "with"):
+        (tmp_path / name).mkdir()
+    problems = problems_of(write(tmp_path / "without", parts, form))
+    assert [problem.column for problem in problems] == ["table.heights_in"]
+    assert problems[0].expected == "the rule House rule requires cm"
+    parts.settings["table.heights_in"] = "cm"
+    load(write(tmp_path / "with", parts, form))
+
+
+def test_unknown_layouts_are_reported():
+    text = OWN.replace("[uncertainty.step]", 'layout = ["centimetre"]\n\n[uncertainty.step]')
+    with pytest.raises(InputError, match="did you mean centimetres"):
+        read(text)
+
+
+@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("name", ["job.toml", "house.toml"])
 def test_a_rule_that_is_no_rule(tmp_path, form, name):
     parts = job_with(name, '[tank]\nid = "T-1"\n' if name == "house.toml" else None)

@@ -426,7 +426,7 @@ SPANISH = [
     "Lugar: patio de tanques, Veracruz   Fecha de calibración: 2025-02-17",
     "Método: triangulación óptica interna   Condiciones: temperatura ambiente 31 °C",
     "Patrones: estación total trazable al CENAM, certificado CNM-CC-740-111/2024",
-    "Referida a 20 °C. Volumen total: 611.41 m³, con una incertidumbre expandida U = 0.55 m³, k = 2",
+    "Referida a 20 °C. Volumen: 611.41 m³, con una incertidumbre expandida U = 0.55 m³, k = 2",
     "Este informe solo ampara al tanque descrito y no debe reproducirse parcialmente.",
     "Aprobó: Ing. María Ejemplo, signataria autorizada",
 ]

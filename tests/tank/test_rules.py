@@ -327,10 +327,14 @@ def test_shipped_rules_state_what_was_verified():
     verified = {name: shipped_rule(name).verified for name in shipped_names()}
     assert verified == {
         "api_2_2a_period": False,
+        "eu_71_349": False,
         "france_2003": True,
         "france_2003_alcohol": True,
         "france_2003_outside": True,
+        "france_2003_rail_tankers": True,
+        "france_2003_road_tankers": True,
         "france_2020_recalibration": True,
+        "germany_2014": False,
         "inmetro_103_2022": False,
         "lithuania_2013_period": False,
         "norway_2007": False,
@@ -356,6 +360,8 @@ def test_shipped_rules_state_what_was_verified():
         ("france_2003", "sphere", 0.5),
         ("france_2003_alcohol", "other", 0.3),  # published: 35.4
         ("france_2003_outside", "other", 0.4),
+        ("france_2003_road_tankers", "horizontal", 0.2),
+        ("france_2003_rail_tankers", "other", 0.2),
         ("norway_2007", "horizontal", 0.5),
     ],
 )

@@ -29,6 +29,11 @@ PLATE = (  # entries of the identification plate of a tank
     *("survey_date", "date_of_issue", "nominal_volume", "capacity", "zero"),
     *("reference_height", "reference_temperature"),
 )
+LAYOUT = {  # layouts of a capacity table: key of [table] and its value
+    "centimetres": ("heights_in", "cm"),
+    "litres": ("volume_unit", "L"),
+    "ullages": ("ullage", True),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,6 +159,8 @@ class Rule(RuleSet):
         Sentences that the rule requires in a certificate, in the language of the rule.
     plate : tuple of str
         Entries of the identification plate, some of PLATE, in their order.
+    layout : tuple of str
+        Layouts that the rule requires of the table, some of LAYOUT.
     name, source, verified, remark
         As for a RuleSet.
     """
@@ -165,6 +172,7 @@ class Rule(RuleSet):
     periods: tuple[Period, ...] = ()
     statements: tuple[str, ...] = ()
     plate: tuple[str, ...] = ()
+    layout: tuple[str, ...] = ()
 
     @property
     def limits(self):
