@@ -38,6 +38,8 @@ class Unit:
     least: int = 0
 
 
+SPACE = "\N{NO-BREAK SPACE}"
+ANGLES = ("°", "′", "″")  # symbols without a space before them, SI Brochure 5.4.3
 UNITS = {
     "": Unit(""),
     "m": Unit("m"),
@@ -113,6 +115,17 @@ def symbol(text):
     text = text.replace("m3", "m³").replace("m2", "m²").replace("degC", "°C").replace("deg", "°")
     above, _, below = text.partition("/")
     return f"{above}/({below})" if "/" in below else f"{above}/{below}" if below else above
+
+
+def with_unit(text, symbol):
+    """Return a number with its unit; degrees, minutes and seconds of angle follow without a space.
+
+    Examples
+    --------
+    >>> with_unit("90.0", "°") + with_unit("2.5", "")
+    '90.0°2.5'
+    """
+    return f"{text}{'' if symbol in ANGLES else SPACE}{symbol}" if symbol else text
 
 
 def like_its_sd(value, sd, marks=ENGLISH):

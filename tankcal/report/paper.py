@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
+from tankcal.job.certificate_entries import IN_LETTERHEAD
 from tankcal.record import load
 from tankcal.record.columns import as_columns
 from tankcal.report import attachments, blocks
@@ -27,6 +28,7 @@ from tankcal.text.words import (
 
 __all__ = ["Column", "Paper"]
 _BLANK = "_" * 20  # line to fill in by hand
+INCOMPLETE = "certificate_incomplete"  # code of the warning of missing entries
 _DIGITS_OF_DIGEST = 12  # digits of the SHA-256 in the footer
 # Decimals of the dimensions of a part, by unit.
 DECIMALS_OF_PARTS = {"m": 4, "m3": 4, "mm/m": 2, "mm": 2, "deg": 2, "kg/m3": 1}
@@ -38,6 +40,20 @@ class ReadRecord:
 
     path: Path
     record: dict = field(repr=False)
+
+
+def _complete(warnings):
+    """Return the warnings without the missing entries that a letterhead supplies."""
+    kept = []
+    for warning in warnings:
+        entries = (warning.get("values") or {}).get("entries")
+        if warning.get("code") == INCOMPLETE and set(entries) & set(IN_LETTERHEAD):
+            missing = [entry for entry in entries if entry not in IN_LETTERHEAD]
+            text = warning["text"].replace(", ".join(entries), ", ".join(missing))
+            kept += [warning | {"text": text, "values": {"entries": missing}}] if missing else []
+        else:
+            kept.append(warning)
+    return kept
 
 
 class Paper(PlainPaper):
@@ -68,9 +84,11 @@ class Paper(PlainPaper):
         else:
             path, record = Path(source), load(source)
         super().__init__(words or load_words(language or language_of(record)))
-        self.record = translate_record(self.words, record)
         self._path = path
         self.letterhead = read_saved(letterhead) if letterhead else None
+        if self.letterhead:
+            record = record | {"warnings": _complete(record["warnings"])}
+        self.record = translate_record(self.words, record)
 
     @property
     def volume_unit(self):

@@ -13,7 +13,6 @@ from tankcal.text.digits import decimals_of, decimals_of_height, fixed, format_s
 from tankcal.text.words import marks_of, percent
 
 __all__ = ["Column", "PlainPaper", "words_with_part"]
-_SPACE = "\N{NO-BREAK SPACE}"
 
 
 class PlainPaper:
@@ -109,7 +108,7 @@ class PlainPaper:
             text = fixed(value * shown.factor, decimals, self.marks)
         else:
             text = format_significant(value * shown.factor, digits or 6, self.marks)
-        return f"{text}{_SPACE}{shown.symbol}" if shown.symbol else text
+        return numbers.with_unit(text, shown.symbol)
 
     def height(self, value_m, unit="m"):
         """Format a height, m, to the millimetre or finer if necessary; None returns None."""
@@ -129,7 +128,7 @@ class PlainPaper:
         if value is None:
             return None
         text = shortest(value, self.marks)
-        return f"{text}{_SPACE}{unit}" if unit else text
+        return numbers.with_unit(text, unit)
 
     def percent(self, share):
         """Format a share in percent."""

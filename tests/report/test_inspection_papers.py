@@ -81,7 +81,7 @@ def test_an_epoch_says_plane_limits_and_verdicts():
     blocks = settlement_blocks(paper, paper.record["settlements"][1])
     said = " ".join(texts_of(blocks)).replace(SPACE, " ")
     for number in (
-        *("17.48 mm", "327.7 °", "1.64 mm/m", "a = 100.21 mm", "14.78 mm", f"{MINUS}9.33 mm"),
+        *("17.48 mm", "327.7°", "1.64 mm/m", "a = 100.21 mm", "14.78 mm", f"{MINUS}9.33 mm"),
         *("R² = 0.9675", "6.28 mm for 16 points, 4.18 m apart", "8 points, it is 25.12 mm"),
     ):
         assert number in said
@@ -381,7 +381,7 @@ def test_a_pdf_says_what_was_found(written):
         *("Inspection of shell and bottom", "Tank T-12", "1 check beyond its limit"),
         *("EXAMPLE", "CONDITIONAL PASS", "FAILED", "not part of the capacity certificate"),
         *("2026 - 2019", "Change from 2019 to 2026", "88.5 %", "not read in the text"),
-        *("121.8 °", "+26.9 mm", "≤ 119 mm *"),
+        *("121.8°", "+26.9 mm", "≤ 119 mm *"),
     ):
         assert text in said
     portuguese = text_of_pdf(written / "few" / "inspection.pdf")

@@ -232,7 +232,7 @@ def test_the_dip_point_is_stated_and_drawn_where_it_was_declared(paper):
         east, north = axis["x_m"] + 3 * share, axis["y_m"] - 4 * share
         drawn.record["job"]["datum"] |= {"dip_x_m": east, "dip_y_m": north}
         said = dip_point_text(drawn).replace("\xa0", " ")
-        assert said.endswith(f"; {5 * share:.3f} m from the axis of the tank, at azimuth 143 °")
+        assert said.endswith(f"; {5 * share:.3f} m from the axis of the tank, at azimuth 143°")
         heights.append(dip_point(drawn.record).share)
     radius = drawn.record["courses"][0]["inside_radius_m"]
     assert heights == pytest.approx([5 / radius, 2.5 / radius])

@@ -25,6 +25,7 @@ SIMPLE = {  # name: (XML type that it restricts, pattern)
     "dcc:country": ("string", "[A-Z]{2}"),
     "dcc:language": ("string", "[a-z]{2}"),
     "dcc:place": ("string", "laboratory|customer|laboratoryBranch|customerBranch|other"),
+    "dcc:change": ("string", "amended|substituted"),
     "dcc:issuer": ("string", "manufacturer|calibrationLaboratory|customer|owner|other"),
     "dcc:kind": ("string", "application|bios|driver|editor|firmware|library|os|other"),
     "dcc:verdict": ("string", "pass|fail|conditionalPass|conditionalFail|noPass|noFail"),
@@ -48,7 +49,8 @@ definition: name=text description=rich? namespace=text1 link=xs:anyURI release=t
 core: countryCodeISO3166_1=country usedLangCodeISO639_1=language+
   mandatoryLangCodeISO639_1=language+ uniqueIdentifier=text1 identifications=identifications?
   receiptDate=xs:date? beginPerformanceDate=xs:date endPerformanceDate=xs:date
-  performanceLocation=place issueDate=xs:date?
+  performanceLocation=place issueDate=xs:date? reportAmendedSubstituted=substituted?
+substituted: typeOfChange=change replacedUniqueIdentifier=text1
 identifications: identification=identification+
 identification: issuer=issuer value=text1 name=text? [refType=types]
 items: item=item+

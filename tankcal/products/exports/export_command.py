@@ -55,6 +55,11 @@ def add(commands):
         help="the gauge is mounted on the shell: compute HyTD, the movement of its reference",
     )
     parser.add_argument(
+        "--high-legs",
+        action="store_true",
+        help="write the table for the floating roof on its legs in their high position",
+    )
+    parser.add_argument(
         "--out", metavar="FILE", help="output file (default: TANK-PROFILE.csv in this folder)"
     )
     add_language(parser)
@@ -78,7 +83,7 @@ def _export(options):
     export = export_record(
         source, profile, points=options.points,
         max_error_m3=None if error is None else error / 1000,
-        hangs_on_shell=options.gauge_on_shell, language=language,
+        hangs_on_shell=options.gauge_on_shell, on_high_legs=options.high_legs, language=language,
     )  # fmt: skip
     paths = write_export(export, _out(options, export, source), language)
     if options.machine:

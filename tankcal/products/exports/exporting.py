@@ -12,7 +12,7 @@ to this curve. It corrects the level shown by the gauge, independently of the he
 
 import hashlib
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from errno import EISDIR
 from pathlib import Path
 
@@ -170,7 +170,7 @@ class Export:
 
 
 def export_record(source, profile, *, points=None, max_error_m3=None, hangs_on_shell=False,
-                  language="en"):  # fmt: skip
+                  on_high_legs=False, language="en"):  # fmt: skip
     """Return the `Export` of the table in a record.
 
     Parameters
@@ -184,6 +184,8 @@ def export_record(source, profile, *, points=None, max_error_m3=None, hangs_on_s
         Largest error; the fewest rows are selected.
     hangs_on_shell : bool, optional
         Whether the gauge is supported by the shell; HyTD is then computed.
+    on_high_legs : bool, optional
+        Whether the floating roof rests on its legs in their high position.
     language : str, optional
         Language of the lines of provenance.
 
@@ -196,7 +198,12 @@ def export_record(source, profile, *, points=None, max_error_m3=None, hangs_on_s
     record = records.read(path, tables=False)
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     _check_table(path.name, record, log)
+    if on_high_legs and not record.on_high_legs:
+        text = message("export_one_position", "the record has one position of the legs of a roof")
+        log.problem(path.name, text, None, "on_high_legs")
     log.stop_if_problems()
+    if on_high_legs:
+        record = _raise_legs(record)
     request = RowRequest(record, profile, points, max_error_m3, log)
     marks, required = request.marks()
     gauge = _find_gauge_correction(path.name, record, log) if hangs_on_shell else None
@@ -241,6 +248,32 @@ def export_record(source, profile, *, points=None, max_error_m3=None, hangs_on_s
         data=data,
         left_out_m=None if rows[-1] == len(height) - 1 else float(height[-1]),
     )
+
+
+def _raise_legs(record):
+    """Return a record whose table and critical zone are those of the high legs."""
+    raised = {row.height_m: row for row in record.on_high_legs}
+    capacity = record.capacity
+    columns = {
+        "volume_m3": "volume_m3",
+        "for_use": "for_use",
+        "U_m3": "U_m3",
+        "stated_U_m3": "U_m3",
+    }
+    changed = {
+        name: [
+            getattr(raised[height], key) if height in raised else value
+            for height, value in zip(capacity.height_m, getattr(capacity, name), strict=True)
+        ]
+        for name, key in columns.items()
+    }
+    high = {size.code: size.value for size in record.roof}
+    codes = {"roof_critical_bottom": "roof_high_bottom", "roof_critical_top": "roof_high_top"}
+    roof = [
+        replace(size, value=high[codes[size.code]]) if size.code in codes else size
+        for size in record.roof
+    ]
+    return replace(record, capacity=replace(capacity, **changed), roof=roof)
 
 
 def default_name(export):

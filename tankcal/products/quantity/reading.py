@@ -330,6 +330,7 @@ def _read(table, settings, rows, factors):
         _refuse_outside_correction(source, gaugings, product)
         _refuse_negative(source, table, gaugings, product)
     _warn_of_slips(source, gaugings, product)
+    _warn_of_high_legs(source, table, gaugings)
     log.stop_if_problems()
     given = sections["uncertainty"]
     u = fill_blanks(given, UNCERTAINTIES)
@@ -691,6 +692,23 @@ def _warn_of_slips(source, gaugings, product):
                        limit=LEAST_SW_PERCENT)  # fmt: skip
     source.tell_each("product.sw_percent", (share > 0) & (share < LEAST_SW_PERCENT),
                      lambda _: fraction, is_warning=True)  # fmt: skip
+
+
+def _warn_of_high_legs(source, table, gaugings):
+    """Warn of dips at which another table applies to a floating roof on high legs."""
+    if not table.high_legs_m:
+        return
+    low, high = table.high_legs_m
+    text = message(
+        "ticket_high_legs",
+        "between {low:g} m and {high:g} m the table is that of the usual legs; with the roof on "
+        "high legs, take the volume from the second table of the certificate",
+        low=low,
+        high=high,
+    )
+    for state, gauging in gaugings.items():
+        is_between = (gauging.level_m > low) & (gauging.level_m < high)
+        source.tell_each(f"{state}.dip_m", is_between, lambda _: text, is_warning=True)
 
 
 def _refuse_outside_correction(source, gaugings, product):

@@ -55,6 +55,8 @@ class TankTable:
         Date of the calibration, ISO.
     levels : dict
         Section [levels] of the job: {"maximum_m": dip or None ...}.
+    high_legs_m : tuple of float
+        Dips between which another table applies to a roof on high legs; () without that position.
     """
 
     tank: str
@@ -74,6 +76,7 @@ class TankTable:
     certificate: Mapping = field(default_factory=dict)
     date: str = ""
     levels: Mapping = field(default_factory=dict)
+    high_legs_m: tuple = ()
 
     def volume(self, level_m):
         """Volume at each dip, m3, linear between two rows; (n,) real or complex dips."""
@@ -181,7 +184,7 @@ def read_table(path):
             "ticket_no_table", "the record of a survey without a tank; expected one with a table"
         )
         raise InputError(Problem(path.name, expected))
-    interpolation = record.get("interpolation")
+    interpolation, raised = record.get("interpolation"), record.get("on_high_legs") or ()
     return TankTable(
         tank=job["tank"]["id"],
         kind=job["tank"]["kind"],
@@ -202,6 +205,7 @@ def read_table(path):
         certificate=job["certificate"],
         date=job["survey"]["date"],
         levels=job.get("levels") or {},
+        high_legs_m=tuple(row["height_m"] for row in raised[:: max(len(raised) - 1, 1)]),
     )
 
 

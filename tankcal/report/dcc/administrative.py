@@ -86,6 +86,10 @@ def _core_data(parent, languages, digest):
     add_child(parent, "performanceLocation", "other")
     if certificate.get("date_of_issue"):
         add_child(parent, "issueDate", str(certificate["date_of_issue"]))
+    if replaced := clean(certificate.get("replaces")):
+        substituted = add_child(parent, "reportAmendedSubstituted")
+        add_child(substituted, "typeOfChange", "substituted")
+        add_child(substituted, "replacedUniqueIdentifier", replaced)
 
 
 def add_identification(parent, value, names, kind):

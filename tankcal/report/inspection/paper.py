@@ -4,6 +4,7 @@ from collections import defaultdict
 from typing import ClassVar
 
 from tankcal.record.inspection import INSPECTION
+from tankcal.report import numbers
 from tankcal.report.plain import words_with_part
 from tankcal.report.saved_document import SavedPaper, bearable, iso_day, signed_text
 from tankcal.text.digits import NOTHING, fixed, shortest
@@ -106,7 +107,7 @@ class InspectionPaper(SavedPaper):
             return None
         symbol, factor, decimals = unit_of(check)
         text = fixed(value * factor, decimals, self.marks)
-        return f"{text}{_SPACE}{symbol}" if symbol else text
+        return numbers.with_unit(text, symbol)
 
     def value(self, check):
         """Figure of a check, with a sign unless the limit is a lower limit."""
@@ -128,8 +129,7 @@ class InspectionPaper(SavedPaper):
         text = shortest(round(bound["value"] * factor, decimals), self.marks)
         sign = "≥" if check["code"] in AT_LEAST else "≤"
         mark = "" if bound["verified"] else f"{_SPACE}{UNVERIFIED}"
-        unit = f"{_SPACE}{symbol}" if symbol else ""
-        return f"{sign}{_SPACE}{text}{unit}{mark}"
+        return f"{sign}{_SPACE}{numbers.with_unit(text, symbol)}{mark}"
 
     def probability(self, check):
         """Probability of conformity, to a tenth of a percent, or None."""

@@ -54,13 +54,19 @@ def density_blocks(paper):
     return blocks
 
 
+def ends_of_high_legs(paper):
+    """Return the lowest and the highest dip of the table with the roof on high legs, as texts."""
+    rows = paper.record["on_high_legs"]
+    return {"low": paper.height(rows[0]["height_m"]), "high": paper.height(rows[-1]["height_m"])}
+
+
 def roof_blocks(paper):
     """Tables of the roof on high legs, and of its corrections by density; [] without a roof."""
     record, shown = paper.record, []
     if rows := record.get("on_high_legs"):
         table = high_legs_table(record)
         across = times_across(paper, rows, table.on_paper(None, rows))
-        ends = {key: paper.height(rows[at]["height_m"]) for key, at in (("low", 0), ("high", -1))}
+        ends = ends_of_high_legs(paper)
         shown.append(paper.paragraph("not_for_use_marked", mark=NOT_FOR_USE))
         shown.append(paper.show(table, rows, across=across, coverage=paper.coverage(), **ends))
     if record.get("roof_corrections"):

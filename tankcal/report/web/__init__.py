@@ -213,7 +213,8 @@ def _text(node):
 
 def calculator_html(block, words):
     """Return the dip calculator: volume of a dip, and volume between two dips."""
-    data = {key: block[key] for key in block if key not in ("kind", "text", "id")}
+    data = {key: block[key] for key in block if key not in ("kind", "text", "id", "note")}
+    notes = filter(None, (words["calculator_note"], block.get("note")))
     fields = "".join(
         f'<p><label for="{name}">{escape(words[name])}</label> '
         f'<input id="{name}" inputmode="decimal" autocomplete="off" size="9" '
@@ -230,7 +231,7 @@ def calculator_html(block, words):
         f'<section class="widget" id="calculator" hidden>'
         f'<h3 id="{block["id"]}">{escape(words["calculator"])}</h3>'
         f'<div class="fields">{fields}</div><div class="answers">{results}</div>'
-        f'<p class="note">{escape(words["calculator_note"])}</p>'
+        f'<p class="note">{escape(" ".join(notes))}</p>'
         '<details id="quantity" hidden></details>'
         f"{_data('calculator', data)}</section>"
     )

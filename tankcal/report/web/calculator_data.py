@@ -10,6 +10,7 @@ import numpy as np
 from tankcal.record.covariance_factor import factor_of
 from tankcal.report.blocks import Block
 from tankcal.report.numbers import unit
+from tankcal.report.uncertainty.capacity import ends_of_high_legs
 from tankcal.report.uncertainty.sources import (
     critical_zone,
     groups_of,
@@ -45,7 +46,9 @@ def calculator(paper):
     capacity, spec = record["capacity"], record["job"]["table"]
     shown = unit(spec["volume_unit"])
     U = np.array(stated_U_m3(capacity)) * shown.factor
-    height_m = capacity["height_m"]
+    height_m, note = capacity["height_m"], {}
+    if record.get("on_high_legs"):
+        note["note"] = paper.word("texts.high_legs", **ends_of_high_legs(paper))
     return Block(
         {
             "kind": "calculator",
@@ -65,6 +68,7 @@ def calculator(paper):
             "deliveries": _deliveries(record, shown.factor),
             "quantity": quantity_data(record),
         }
+        | note
     )
 
 

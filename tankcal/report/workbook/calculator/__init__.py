@@ -18,6 +18,7 @@ rounded height is accepted as input for this row. A dip above both heights is re
 
 from dataclasses import dataclass
 
+from tankcal.report.uncertainty.capacity import ends_of_high_legs
 from tankcal.report.workbook.calculator import delivery, reverse, service
 from tankcal.report.workbook.calculator.cells import (
     NANOMETRE,
@@ -240,8 +241,11 @@ def _notes(book, sheet, row, table):
         "corrections": book.sheet_name("corrections"),
         "capacity_mm": book.sheet_name("capacity_mm"),
     }
-    for key in ("volume", "service", "product", "delivery", "hidden"):
-        text = book.word(f"notes.{key}", of="calculator", **values)
+    keys = ("volume", "service", "product", "delivery", "hidden")
+    texts = [book.word(f"notes.{key}", of="calculator", **values) for key in keys]
+    if book.paper.record.get("on_high_legs"):
+        texts.insert(0, book.paper.word("texts.high_legs", **ends_of_high_legs(book.paper)))
+    for text in texts:
         book.paragraph(sheet, row, text, _WIDTHS, font_color=MUTED)
         row += 1
 
