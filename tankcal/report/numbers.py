@@ -117,12 +117,12 @@ def symbol(text):
     return f"{above}/({below})" if "/" in below else f"{above}/{below}" if below else above
 
 
-def with_unit(text, symbol):
+def join_unit(text, symbol):
     """Return a number with its unit; degrees, minutes and seconds of angle follow without a space.
 
     Examples
     --------
-    >>> with_unit("90.0", "°") + with_unit("2.5", "")
+    >>> join_unit("90.0", "°") + join_unit("2.5", "")
     '90.0°2.5'
     """
     return f"{text}{'' if symbol in ANGLES else SPACE}{symbol}" if symbol else text

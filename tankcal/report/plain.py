@@ -108,7 +108,7 @@ class PlainPaper:
             text = fixed(value * shown.factor, decimals, self.marks)
         else:
             text = format_significant(value * shown.factor, digits or 6, self.marks)
-        return numbers.with_unit(text, shown.symbol)
+        return numbers.join_unit(text, shown.symbol)
 
     def height(self, value_m, unit="m"):
         """Format a height, m, to the millimetre or finer if necessary; None returns None."""
@@ -128,7 +128,7 @@ class PlainPaper:
         if value is None:
             return None
         text = shortest(value, self.marks)
-        return numbers.with_unit(text, unit)
+        return numbers.join_unit(text, unit)
 
     def percent(self, share):
         """Format a share in percent."""

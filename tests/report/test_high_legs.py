@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 import pytest
 from dcc_schema import DCC, schema
 from job_builder import write_job
+from paper_words import cells_of_sheet
 
 import tankcal
 from tankcal import record as records
@@ -14,6 +15,7 @@ from tankcal.products.exports.profiles import find_profile
 from tankcal.products.quantity.table import table_of
 from tankcal.record import record_of
 from tankcal.report.dcc import certificate_xml
+from tankcal.report.letterhead import load
 from tankcal.report.paper import Paper
 from tankcal.report.uncertainty.capacity import roof_blocks
 from tankcal.report.web import calculator_html
@@ -94,3 +96,29 @@ def test_the_digital_certificate_with_every_part_is_valid(path):
     kinds = {element.get("refType") for element in root.iter()}
     expected = {"onHighLegs", "roofCorrections", "seal", "nextVerification"}
     assert {f"tankcal_{name}" for name in expected} <= kinds
+
+
+@pytest.mark.slow
+def test_the_calculator_of_the_workbook_has_the_note(path, tmp_path):
+    record = records.load(path)
+    note = Paper(record, language="en").word("texts.high_legs", low="1.000 m", high="2.000 m")
+    shown = cells_of_sheet(record, tmp_path / "capacity.xlsx", "Dip calculator")
+    assert note in [cell.replace("\xa0", " ") for cell in shown if isinstance(cell, str)]
+
+
+@pytest.mark.slow
+def test_a_letterhead_supplies_entries_of_the_warning(path, tmp_path):
+    (tmp_path / "lab.toml").write_text(
+        '[laboratory]\nname = "Lab"\naddress = ["A 1"]\n', encoding="utf-8"
+    )
+    file = load(tmp_path / "lab.toml").save(tmp_path)
+    texts = [
+        next(
+            warning["text"]
+            for warning in Paper(path, language="en", letterhead=letterhead).record["warnings"]
+            if warning["code"] == "certificate_incomplete"
+        )
+        for letterhead in (None, tmp_path / file)
+    ]
+    assert ["Address of the customer" in text for text in texts] == [True, True]
+    assert ["Laboratory" in text for text in texts] == [True, False]

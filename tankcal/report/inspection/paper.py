@@ -107,7 +107,7 @@ class InspectionPaper(SavedPaper):
             return None
         symbol, factor, decimals = unit_of(check)
         text = fixed(value * factor, decimals, self.marks)
-        return numbers.with_unit(text, symbol)
+        return numbers.join_unit(text, symbol)
 
     def value(self, check):
         """Figure of a check, with a sign unless the limit is a lower limit."""
@@ -129,7 +129,7 @@ class InspectionPaper(SavedPaper):
         text = shortest(round(bound["value"] * factor, decimals), self.marks)
         sign = "≥" if check["code"] in AT_LEAST else "≤"
         mark = "" if bound["verified"] else f"{_SPACE}{UNVERIFIED}"
-        return f"{sign}{_SPACE}{numbers.with_unit(text, symbol)}{mark}"
+        return f"{sign}{_SPACE}{numbers.join_unit(text, symbol)}{mark}"
 
     def probability(self, check):
         """Probability of conformity, to a tenth of a percent, or None."""

@@ -38,15 +38,15 @@ def group_rows(record):
     return rows
 
 
-def _number_with_unit(key):
+def _number_join_unit(key):
     return lambda paper, row: paper.number(row[key], row["small_unit"], digits=2)
 
 
 def _declared_sd(paper, row):
     smallest, largest = row["sd_smallest"], row["sd_largest"]
     if smallest is None or not largest > smallest * (1 + 1e-9):
-        return _number_with_unit("sd_smallest")(paper, row)
-    return f"{paper.number(smallest, digits=2)}–{_number_with_unit('sd_largest')(paper, row)}"
+        return _number_join_unit("sd_smallest")(paper, row)
+    return f"{paper.number(smallest, digits=2)}–{_number_join_unit('sd_largest')(paper, row)}"
 
 
 def _symbol(key):
@@ -83,7 +83,7 @@ GROUPS = Table(
         Column("declared_sd", text=_declared_sd, align="right"),
         *(Column(key, decimals=_two_digits(key), on="", sheet=key, width=11, csv=key)
           for key in ("sd_smallest", "sd_largest")),
-        Column("rms", text=_number_with_unit("rms"), align="right",
+        Column("rms", text=_number_join_unit("rms"), align="right",
                sheet="rms", width=11, csv="rms",
                in_sheet={"text": None, "decimals": _two_digits("rms")}),
         Column("small_unit", text=_symbol("small_unit"), on="", sheet="unit", width=8),
