@@ -15,7 +15,7 @@ from tankcal.report.workbook import write
 from tankcal.report.workbook.look import Column, _longest_number
 from tankcal.report.workbook.writer import NumberRow, Sheet
 from tankcal.text.digits import decimals_of
-from tankcal.text.words import choice_sentence, load_words, sentence
+from tankcal.text.words import choice_sentence, load_words, sentence, translate_record
 
 # openpyxl does not know our data bars, and says so each time
 pytestmark = pytest.mark.filterwarnings("ignore:.*extension is not supported:UserWarning")

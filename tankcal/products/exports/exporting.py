@@ -199,7 +199,7 @@ def export_record(source, profile, *, points=None, max_error_m3=None, hangs_on_s
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     _check_table(path.name, record, log)
     if on_high_legs and not record.on_high_legs:
-        text = message("export_single_position", "the legs of the roof have a single position in the record")
+        text = message("export_single_position", "its roof has a single position of the legs")
         log.problem(path.name, text, None, "on_high_legs")
     log.stop_if_problems()
     if on_high_legs:
