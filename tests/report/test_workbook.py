@@ -2,6 +2,7 @@
 
 import copy
 import json
+import re
 import xml.etree.ElementTree as ET
 import zipfile
 from decimal import Decimal
@@ -362,7 +363,23 @@ def test_columns_of_numbers_are_the_cells_of_xlsxwriter(short, tmp_path, monkeyp
     write(short, tmp_path / "columns.xlsx")
     monkeypatch.setattr("tankcal.report.workbook.book.Sheet", CellByCell)
     write(short, tmp_path / "cells.xlsx")
-    assert (tmp_path / "columns.xlsx").read_bytes() == (tmp_path / "cells.xlsx").read_bytes()
+    ours, theirs = (parts_of(tmp_path / name) for name in ("columns.xlsx", "cells.xlsx"))
+    # A row without blank cells has no places: its cells follow each other.
+    whole = re.compile(rb'<c r="A(\d+)" s="\d+"><v>[^<]*</v></c>(?:<c r="[A-Z]+\1" s="\d+"><v>'
+                       rb"[^<]*</v></c>)*(?=</row>)")  # fmt: skip
+    bare = 0
+    for name, content in theirs.items():
+        if ours[name] != content:
+            content = whole.sub(lambda cells: re.sub(rb' r="[A-Z]+\d+"', b"", cells[0]), content)
+            bare += 1
+        assert ours[name] == content
+    assert 0 < bare <= 2
+
+
+def parts_of(path):
+    """Content of each file in a workbook."""
+    with zipfile.ZipFile(path) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
 
 
 @pytest.mark.parametrize(
