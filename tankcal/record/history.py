@@ -124,6 +124,20 @@ class InspectionInHistory(Saved):
     checks: list[CheckInHistory] = key("in their order, the worst of each")
 
 
+class MonthInHistory(Saved):
+    """A month of an upkeep by everyday data."""
+
+    file: str = key("path of upkeep.json")
+    month: str = key("year-month")
+    table_sha256: str = key("of the record of the table in force")
+    leak_l_h: Finite = key("loss by time")
+    leak_U_l_h: Finite = key("expanded")
+    throughput_percent: Finite = key("causes proportional to throughput, less their mean")
+    throughput_U_percent: Finite = key("expanded")
+    verdict: str = key('"pass", "fail" or "inconclusive"')
+    alarm: str | None = key("day of the first alarm, if it is in this month")
+
+
 class HistoryFile(Saved, kw_only=True):
     """History of the certificates of a tank."""
 
@@ -139,5 +153,8 @@ class HistoryFile(Saved, kw_only=True):
     radii: list[RadiusInHistory] = key("of each certificate and course; none: not known")
     changes: list[TableChange] = key("between successive certificates")
     inspections: list[InspectionInHistory] = key("by their dates; without date last")
+    months: list[MonthInHistory] | None = key(
+        "of upkeeps, in their order; left out if there are none", default=None, optional=True
+    )
     left_out: list[WarningRecord] = key("excluded files, with the reason")
     warnings: list[WarningRecord] = key("on the history")

@@ -127,6 +127,31 @@ def test_tables_deliveries_and_meters_hold(table):
     assert min(share.values()) > 0.88
 
 
+DRAWING = {"radius": 0.0125, "length": 0.12, "end": 0.06, "tilt": 0.015, "zero": 0.01}
+
+
+@pytest.mark.study
+def test_deliveries_of_stations_from_drawings_hold():
+    """20 stations of a year with the table of a drawing: all deliveries within 95 % intervals.
+
+    With the columns of the gauge at the levels as read, the mean error was 1.3 u, and 5 of 6 held.
+    """
+    drawing, ratios = make_table(DRAWING), []
+    for seed in range(20):
+        year = draw_year(np.random.default_rng(9000 + seed), drawing, days=365, sizes=DRAWING)
+        estimation = estimate(year.operation, year.steps)
+        levels = estimation.balance.level_m
+        ends = np.array([levels.min(), levels.max()])
+        volume, factor = update_table(estimation, year.operation.stock, *ends)
+        new = replace(drawing, volume_m3=volume, factor_m3=factor)
+        error = np.diff(new.volume(ends) - year.tank.below(ends))[0]
+        ratios.append(error / np.linalg.norm(np.diff(new.factor(ends), axis=0)))
+    print("deliveries by drawings, mean and rms of error over u:", np.mean(ratios),
+          np.sqrt(np.mean(np.square(ratios))))  # fmt: skip
+    assert np.mean(np.abs(ratios) < 1.96) >= 0.9
+    assert abs(np.mean(ratios)) < 0.5
+
+
 # ---- planted faults
 
 
@@ -152,6 +177,20 @@ def test_planted_faults_are_named(table, kind, size, unit, seed):
 def test_years_without_a_fault_have_no_alarm(table, seed):
     year = draw_year(np.random.default_rng(seed), table, days=120)
     assert watch(estimate(year.operation, year.steps)).alarm_s is None
+
+
+@pytest.mark.study
+def test_false_alarms_of_fifty_years(table):
+    """50 years without a fault by a generator that is not the model, at a promised rate of 5 %.
+
+    A limit by the model alone gave 9 alarms in 16 years. docs/studies/upkeep.md has 200 years.
+    """
+    alarms = 0
+    for seed in range(50):
+        year = draw_year(np.random.default_rng(5000 + seed), table, days=365)
+        alarms += watch(estimate(year.operation, year.steps)).alarm_s is not None
+    print("alarms in 50 years without a fault:", alarms)
+    assert alarms <= 7
 
 
 @pytest.mark.parametrize("late_s", [0, 600, -300, 3600])
@@ -291,6 +330,13 @@ def test_example_of_a_station(record, tmp_path, capsys):
         assert verdicts[month]["verdict"] == "fail"
         assert abs(verdicts[month]["leak_l_h"] - 0.65) < 1.5 * verdicts[month]["U_l_h"]
     assert "leak or another loss by time" in capsys.readouterr().out
+    archive = [str(tmp_path / "station" / name) for name in ("first-results", "second-results")]
+    assert cli.main(["history", str(record), *archive, "--out", str(tmp_path / "history")]) == 0
+    shown = capsys.readouterr().out
+    assert shown.count("; FAIL") == sum(row["verdict"] == "fail" for row in second["months"]) > 1
+    rows = (tmp_path / "history" / "months.csv").read_text().splitlines()
+    assert len(rows) == 1 + len(saved["months"]) + len(second["months"])
+    assert sum(second["watch"]["alarm"] in row for row in rows) == 1
 
 
 @pytest.mark.slow

@@ -58,6 +58,7 @@ class DatedTable:
 def history_of(
     tables,
     inspections=(),
+    months=(),
     *,
     dips_m=None,
     courses=None,
@@ -73,6 +74,7 @@ def history_of(
     tables : sequence of DatedTable
         At least one table, in any order.
     inspections : sequence of InspectionInHistory
+    months : sequence of MonthInHistory
     dips_m : sequence of float, optional
         Dips of the volumes shown; None: fifths of the common range of all tables.
     courses : (heights, thicknesses), optional
@@ -136,6 +138,7 @@ def history_of(
             inspections,
             key=lambda inspection: (inspection.date is None, inspection.date, inspection.file),
         ),
+        months=sorted(months, key=lambda month: (month.month, month.file)) or None,
         left_out=warnings_of(left_out),
         warnings=_warnings(problems, successive),
     )

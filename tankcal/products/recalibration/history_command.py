@@ -13,7 +13,7 @@ from tankcal.terminal.showing import (
     speak_of_record,
     warn,
 )
-from tankcal.text.digits import NOTHING, decimals_of_height, fixed
+from tankcal.text.digits import NOTHING, decimals_of_height, fixed, format_with_u
 
 MOST_SHOWN = 20  # warnings, and files that are left out
 
@@ -116,6 +116,8 @@ def _tell(history):
         say(_change(change, paper))
     for inspection in history["inspections"]:
         say(_inspection(inspection))
+    for month in history.get("months") or ():
+        say(_month(month, paper))
 
 
 def _span(history):
@@ -152,6 +154,17 @@ def _certificate(certificate, state):
         uncertainty=U,
         name=certificate["number"] or certificate["file"],
     )
+
+
+def _month(month, paper):
+    leak = format_with_u(month["leak_l_h"], month["leak_U_l_h"], marks())
+    change = format_with_u(month["throughput_percent"], month["throughput_U_percent"], marks())
+    return message(
+        "history_month", "  {month}: loss {leak} L/h, U = {U}; throughput {change} %, "
+        "U = {of_change}; {verdict}", month=month["month"], leak=leak.value, U=leak.uncertainty,
+        change=change.value, of_change=change.uncertainty,
+        verdict=paper.words["month_verdicts"][month["verdict"]],
+    )  # fmt: skip
 
 
 def _change(change, paper):

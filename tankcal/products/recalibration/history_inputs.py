@@ -16,11 +16,12 @@ from tankcal.products.recalibration.comparison import read_course_sizes, rows_fi
 from tankcal.products.recalibration.history import DatedTable, history_of
 from tankcal.products.recalibration.reading import read_former
 from tankcal.products.register.certificates import read_certificates
-from tankcal.record.history import CheckInHistory, InspectionInHistory
+from tankcal.record.history import CheckInHistory, InspectionInHistory, MonthInHistory
 from tankcal.record.inspection import INSPECTION, VERDICTS
 from tankcal.text.delimited import decode_text, find_encoding
 
 RECORD = "record.json"
+UPKEEP, UPKEEP_FORMAT = "upkeep.json", "tankcal-upkeep/1"
 MOST_NAMED = 10  # largest number of tanks listed in a message
 TABLES = (".csv", ".xlsx", ".pdf", ".toml")
 
@@ -33,6 +34,7 @@ class HistoryArchive:
     ----------
     tables : list of DatedTable
     inspections : list of InspectionInHistory
+    months : list of MonthInHistory
     left_out : list of Problem
         Files that cannot be part of a history, with the reason.
     warnings : list of Problem
@@ -48,6 +50,7 @@ class HistoryArchive:
 
     tables: list = field(default_factory=list)
     inspections: list = field(default_factory=list)
+    months: list = field(default_factory=list)
     left_out: list = field(default_factory=list)
     warnings: list = field(default_factory=list)
     problems: list = field(default_factory=list)
@@ -134,6 +137,7 @@ def history_of_files(paths, *, tanks=(), dips_m=None, courses=None, register=Non
     return history_of(
         archive.tables,
         archive.inspections,
+        archive.months,
         dips_m=dips_m,
         courses=shell,
         register=None if register is None else certificates,
@@ -206,7 +210,7 @@ def _files_below(folder, problems):
 
     for place, folders, files in os.walk(folder, onerror=report):
         folders[:] = sorted(folder for folder in folders if not folder.startswith("."))
-        for name in (RECORD, INSPECTION.file):
+        for name in (RECORD, INSPECTION.file, UPKEEP):
             if name in files and Path(place, name).is_file():  # excludes pipes and broken links
                 yield Path(place, name)
 
@@ -239,6 +243,8 @@ def _read(archive, path, name, is_searched):
     digest = hashlib.sha256(data).hexdigest()
     if kind.startswith(f"{INSPECTION.name}/"):
         _add_inspection(archive, INSPECTION.migrated(saved, path.name), name, digest)
+    elif kind == UPKEEP_FORMAT:
+        _add_upkeep(archive, saved, name, digest)
     else:
         _add_record(archive, records.migrated(saved, path.name), path, name, digest)
 
@@ -326,6 +332,22 @@ def _add_inspection(archive, saved, name, digest):
             checks=_worst_checks(saved["checks"]),
         )
     )
+
+
+def _add_upkeep(archive, saved, name, digest):
+    """Add the months of an upkeep."""
+    if archive.is_of_other_tank(saved["tank"]) or archive.is_repeated(name, digest):
+        return
+    archive.count(saved["tank"])
+    alarm = saved["watch"]["alarm"]
+    archive.months += [
+        MonthInHistory(
+            name, month["month"], saved["record_sha256"], month["leak_l_h"], month["U_l_h"],
+            month["throughput_percent"], month["U_percent"], month["verdict"],
+            alarm if alarm and alarm.startswith(month["month"]) else None,
+        )
+        for month in saved["months"]
+    ]  # fmt: skip
 
 
 def _worst_checks(checks):

@@ -11,6 +11,7 @@ from tankcal.report.history.tables import (
     CERTIFICATES,
     CHANGES,
     CHECKS,
+    MONTHS,
     RADII,
     RADIUS_CHANGES,
     VOLUMES,
@@ -30,6 +31,7 @@ TABLES = {
     "changes.csv": CHANGES,
     "radius_changes.csv": RADIUS_CHANGES,
     "inspections.csv": CHECKS,
+    "months.csv": MONTHS,
 }
 
 
@@ -56,6 +58,7 @@ class HistoryPaper(SavedPaper):
         super().__init__(words_with_part(words, "history"))
         self.words["checks"] = words["inspection"]["checks"]
         self.words["check_verdicts"] = words["inspection"]["verdicts"]
+        self.words["month_verdicts"] = words["upkeep"]["verdicts"]
         self.words["steps"] = words["comparison"]["steps"]
         self.saved = self.record = HISTORY.migrated(history, HISTORY.file)
         self.letterhead = letterhead.data() if letterhead else None

@@ -17,6 +17,7 @@ from tankcal.report.history.tables import (
     CERTIFICATES,
     CHANGES,
     CHECKS,
+    MONTHS,
     RADII,
     VOLUMES,
     check_rows,
@@ -49,6 +50,7 @@ SHEETS = {
     "radii": RADII,
     "changes": CHANGES,
     "inspections": CHECKS,
+    "months": MONTHS,
     "origins": replace(CERTIFICATES.only(*ORIGIN_COLUMNS), name="origins"),
 }
 
@@ -85,6 +87,7 @@ def pages(paper, folder=None, whole=False):
         *_radii(paper, whole),
         *_changes(paper),
         *_inspections(paper),
+        *_months(paper),
         *_limits(paper),
         *_files(paper),
     ]
@@ -176,6 +179,12 @@ def _inspections(paper):
         *([paper.figure(draw_checks(paper), "inspections")] if has_figure else []),
         paper.show(CHECKS, rows),
     ]
+
+
+def _months(paper):
+    """Return the months of the upkeeps by everyday data."""
+    rows = MONTHS.rows(paper.record)
+    return [paper.heading("months"), paper.show(MONTHS, rows)] if rows else []
 
 
 def _limits(paper):

@@ -170,6 +170,25 @@ CHECKS = Table(
 )
 
 
+MONTHS = Table(
+    "history_months",
+    (
+        _text("month", width=10),
+        Column("leak_l_h", u="leak_U_l_h", least=1, csv="leak_l_h", **_SHOWN),
+        Column("leak_U_l_h", u="leak_U_l_h", least=1, csv="leak_U_l_h", **_SHOWN),
+        Column("throughput_percent", u="throughput_U_percent", least=1, csv="throughput_percent",
+               **_SHOWN),
+        Column("throughput_U_percent", u="throughput_U_percent", least=1,
+               csv="throughput_U_percent", **_SHOWN),
+        _code("verdict", "month_verdicts"),
+        _day("alarm"),
+        _text("file", width=34, on=""),
+        _text("table_sha256", width=66, on=""),
+    ),
+    rows=lambda history: history.get("months") or [],
+)  # fmt: skip
+
+
 def _steps(paper, row):
     names = paper.words["steps"]
     return ", ".join(names.get(step, step) for step in row["not_made"]) or None
