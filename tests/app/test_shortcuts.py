@@ -1,9 +1,14 @@
 """Shortcuts that open the app by a double click."""
 
 import base64
+import os
 import re
+import shlex
 import shutil
+import signal
 import subprocess
+import sys
+import time
 
 import pytest
 
@@ -68,3 +73,29 @@ def test_the_entry_is_valid_for_its_standard(tmp_path):
     (path,) = shortcuts.write_shortcuts(tmp_path, "linux")
     done = subprocess.run(["desktop-file-validate", str(path)], capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (0, "")
+
+
+@pytest.mark.slow
+def test_a_browser_in_the_foreground_gets_the_page(tmp_path):
+    """A browser that returns only when it is closed, and asks before the server answers."""
+    browser = tmp_path / "browser"
+    got = tmp_path / "page"
+    code = (
+        "import sys, urllib.request as r; o = r.build_opener(r.HTTPCookieProcessor());"
+        f"open({str(got)!r}, 'wb').write(o.open(sys.argv[1], timeout=60).read())"
+    )
+    browser.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -c "{code}" "$1"\n')
+    browser.chmod(0o755)
+    environment = {**os.environ, "DISPLAY": ":99", "BROWSER": str(browser), "HOME": str(tmp_path),
+                   "TANKCAL_STATE": str(tmp_path / "state")}  # fmt: skip
+    command = [sys.executable, "-m", "tankcal"]
+    with subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL) as app:
+        try:
+            end = time.monotonic() + 60
+            while not (got.is_file() and b"</html>" in got.read_bytes()):
+                assert app.poll() is None
+                assert time.monotonic() < end
+                time.sleep(0.1)
+        finally:
+            app.send_signal(signal.SIGINT)
+            app.wait(30)

@@ -157,7 +157,7 @@ def run_app(options):
     restart = f"{scheme}://{outer}{base}/?token={token}"
     state_file = serving.write_state(site.state, restart) if people is None else None
     if not options.no_browser:
-        serving.open_browser(address)
+        serving.open_browser_meanwhile(address)
     try:
         serving.serve(bound, application, state_file, options.certificate)
     finally:

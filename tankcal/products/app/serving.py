@@ -3,6 +3,7 @@
 import json
 import os
 import socket
+import threading
 import webbrowser
 from contextlib import suppress
 from pathlib import Path
@@ -126,6 +127,11 @@ def open_browser(address):
         webbrowser.open(address)
 
 
+def open_browser_meanwhile(address):
+    """Open a browser while the server starts: some browsers return only when they are closed."""
+    threading.Thread(target=open_browser, args=(address,), daemon=True).start()
+
+
 __all__ = [
     "HERE",
     "LOCAL_NAMES",
@@ -137,6 +143,7 @@ __all__ = [
     "guard_application",
     "new_token",
     "open_browser",
+    "open_browser_meanwhile",
     "running_address",
     "serve",
     "write_state",
