@@ -23,7 +23,7 @@ from tankcal.text.words import load_words
 # The lower limit of accurate capacity is a term of legal metrology; JCGM 101 has a tolerance.
 WRONG = {
     "en": r"accura(?:cy|te)\b(?! capacity)|precis(?:ion|e)\b|reliab|error (?:ellips|bar)"
-    r"|true value|probable error|margin of error|(?-i:Parameters \()",
+    r"|true value|probable error|margin of error|\bsds\b|(?-i:Parameters \()",
     "es": r"exactitud|precisi[óo]n|precis[oa]s?\b|fiab|elips\w* de error|valor verdadero"
     r"|margen de error|(?-i:Parámetros \()",
     "pt": r"exatid[ãa]o|acur[áa]ci|precis(?:ão|[oa]s?\b)|confiabil|elips\w* de erro"
