@@ -261,7 +261,8 @@ def _run_means(drift, gains, data, mean, *, is_kept=False):
             mean = mean[MARK:] + gains.gain[k, MARK:, None] * rows[k]
         else:
             mean = mean[MARK:]
-    return rows / gains.sd_m3[:, None], mean, predicted
+    rows /= gains.sd_m3[:, None]  # in place: years of steps with many columns
+    return rows, mean, predicted
 
 
 @dataclass(frozen=True)

@@ -256,11 +256,13 @@ def _months(estimation, start_ns, k, scale):
     steps, drift = estimation.steps, estimation.balance.drift
     ends = (steps.marks.time_ns[1:]).view("datetime64[ns]").astype("datetime64[M]")
     months = np.unique(ends)
-    inside = ends[:, None] == months
-    leak = inside * (drift.seconds / 3.6e6)[:, None]
-    through = inside * (drift.metered_m3.sum(axis=1) / 100)[:, None]
-    white = whiten_steps(drift, np.hstack([leak, through])).rows
-    causes, count = estimation.balance.causes, len(months)
+    count, number = len(months), np.searchsorted(months, ends)
+    columns, step = np.zeros((len(steps), 2 * count)), np.arange(len(steps))
+    columns[step, number] = drift.seconds / 3.6e6
+    columns[step, count + number] = drift.metered_m3.sum(axis=1) / 100
+    white = whiten_steps(drift, columns).rows
+    del columns
+    causes = estimation.balance.causes
     (place,) = causes.place("loss") if len(causes.place("loss")) else (None,)
     # The loss by time is that of each month alone; its prior is used in the verdict.
     rows = estimation.rows if place is None else np.delete(estimation.rows, 1 + place, axis=1)
@@ -282,7 +284,7 @@ def _months(estimation, start_ns, k, scale):
             verdict = "fail" if sizes[i] > usual + detectable / 2 else "pass"
         result.append(
             saved.UpkeepMonth(
-                str(month), int(np.sum(estimation.is_used & inside[:, i])), float(sizes[i]),
+                str(month), int(np.sum(estimation.is_used & (number == i))), float(sizes[i]),
                 float(k * sd[i]), float(detectable) if detectable < 1e3 else None, verdict,
                 float(sizes[count + i]), float(k * sd[count + i]),
             )
@@ -296,10 +298,12 @@ def _fit_months(rows, columns):
     rows: (n, 1 + c), columns: (n, months), whitened.
     """
     count = rows.shape[1] - 1
-    effects = np.hstack([rows[:, 1:], columns])
+    # Normal equations of all unknowns; the blocks need no copy of the columns.
+    both = rows.T @ columns
+    normal = np.block([[rows[:, 1:].T @ rows[:, 1:], both[1:]], [both[1:].T, columns.T @ columns]])
     prior = np.append(np.ones(count), np.full(columns.shape[1], WIDE_CHANGE**-2))
-    inverse = np.linalg.inv(effects.T @ effects + np.diag(prior))
-    sizes = inverse @ (effects.T @ rows[:, 0])
+    inverse = np.linalg.inv(normal + np.diag(prior))
+    sizes = inverse @ np.append(rows[:, 1:].T @ rows[:, 0], both[0])
     return sizes[count:], inverse[count:, count:]
 
 

@@ -184,7 +184,9 @@ def _watch_window(estimation, begin, first, last, rate):
     # no valid tank has, only the innovations before the first suspicion are drawn.
     pool = np.append(estimation.innovations[:begin], innovations)
     if np.any(size_of > PROVISIONAL * limit_of_model):
-        pool = pool[: begin + edges[np.argmax(size_of > limit_of_model)]]
+        # Without the day of the suspicion: a jump is a single large innovation.
+        day = np.argmax(size_of > limit_of_model)
+        pool = pool[: begin + (edges[day - 1] if day else 0)]
     if seconds[len(pool)] >= LEAST_TANK_DAYS * DAY_S:
         blocks = _draw_blocks(pool, seconds, len(end), rng, DRAWS)
         by_tank = _largest(effects, root, edges, blocks)
