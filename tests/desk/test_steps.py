@@ -1,5 +1,6 @@
 """Undo, Redo, names of edits, revisions, and the journal of unsaved edits."""
 
+import json
 import random
 from pathlib import Path
 
@@ -298,3 +299,37 @@ def test_rows_are_imported_as_a_single_edit(folder):
     desk.draft.undo()
     desk.draft.undo()
     assert rendered(desk.draft) == before
+
+
+def test_undo_continues_after_a_restart(folder, tmp_path):
+    """Edits, some undone, Save, restart: each further Undo and Redo gives the earlier files."""
+    state, draw, desk = tmp_path / "state", random.Random(7), open_desk(folder)
+    desk.keep_journal(Journal(folder, state))
+    for _ in range(30):
+        edit_at_random(desk, draw)
+        desk.draft.set_value("job", "tank", "owner", str(draw.random()))
+    for _ in range(5):
+        desk.draft.undo()
+    while desk.draft.undo_operations and any(desk.draft._ambiguous_values()):
+        desk.draft.undo()
+    desk.save()
+    again = open_desk(folder, state=state)
+    assert not again.draft.is_changed
+    for step in ("redo",) * 3 + ("undo",) * 40:
+        names = [getattr(item.draft, f"{step}_operations") for item in (desk, again)]
+        assert json.dumps(names[0]) == json.dumps(names[1])
+        assert getattr(desk.draft, step)() == getattr(again.draft, step)()
+        assert rendered(desk.draft)[0] == rendered(again.draft)[0]
+    # A file that another program changed has no earlier states here.
+    path = folder / "points.csv"
+    path.write_text(path.read_text() + "# other\n")
+    assert not open_desk(folder, state=state).draft.undo_operations
+
+
+@pytest.mark.parametrize("content", ["", "{", "[]", '{"files": 1}', '{"undo": [1]}'])
+def test_a_damaged_history_is_ignored(folder, tmp_path, content):
+    desk = open_desk(folder, state=tmp_path)
+    Journal(folder, tmp_path).keep_history(desk.draft.digests(), {"undo": [[1, 2]], "redo": 3})
+    assert not open_desk(folder, state=tmp_path).draft.undo_operations
+    Journal(folder, tmp_path).history.write_text(content)
+    assert not open_desk(folder, state=tmp_path).draft.undo_operations

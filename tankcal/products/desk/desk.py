@@ -51,6 +51,10 @@ class Desk:
     def keep_journal(self, journal):
         """Write each edit to a journal; `unsaved` are the edits of an earlier session."""
         self.unsaved = journal.read(self.draft.digests())
+        history = journal.read_history(self.draft.digests())
+        with suppress(InputError, ValueError, LookupError, TypeError, AttributeError):
+            if history is not None:
+                self.draft.restore_history(history)
         self._journal = journal
         if self.unsaved is None:
             journal.begin(self.draft.digests())
@@ -336,6 +340,7 @@ class Desk:
         self._check = None
         if self._journal is not None:
             self._journal.begin(self.draft.digests())
+            self._journal.keep_history(self.draft.digests(), self.draft.describe_history())
         self.notify()
         return written
 

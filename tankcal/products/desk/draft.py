@@ -55,6 +55,7 @@ FORMULAS = message(
     "would be lost here",
 )
 MOST_UNDO = 200  # number of edits that Undo can revert
+MOST_HISTORY = 1_000_000  # letters of the steps that a later session can undo
 OPERATIONS = (
     *("set_cells", "insert_rows", "remove_rows", "add_column", "add_table", "set_value", "restore"),
 )
@@ -308,7 +309,11 @@ class Draft:
         The journal repeats Undo and Redo by this edit, because it does not contain the states
         before its beginning.
         """
-        tables, keys = dict(self.tables), dict(self.keys)
+        self._commit(("restore", files), replaced=self._replace_states(self, files))
+
+    def _replace_states(self, state, files):
+        """Tables and keys of a `Draft` or `Step`, with the content of files as in `restore`."""
+        tables, keys = dict(state.tables), dict(state.keys)
         for name, text in files.items():
             if text is None:
                 tables.pop(name, None)
@@ -317,7 +322,44 @@ class Draft:
             else:
                 tables[name] = read_csv_table(name, f"{name}.csv", text, *self._marks)
                 self._saved_bytes.setdefault(f"{name}.csv", None)
-        self._commit(("restore", files), replaced=(tables, keys))
+        return tables, keys
+
+    def describe_history(self):
+        """Steps of Undo and Redo as plain data, the next first; at most `MOST_HISTORY` letters.
+
+        Returns
+        -------
+        dict
+            {"undo", "redo"}: [operations, {name: text or None}], the content of the files that
+            the step restores, as in `restore`. Empty for a workbook, whose steps end with Save.
+        """
+        history = {}
+        for kind, steps in {"undo": self._undo_steps, "redo": self._redo_steps}.items():
+            after, size, listed = {**self.tables, **self.keys}, 0, history.setdefault(kind, [])
+            for step in reversed(() if self.is_book else steps):
+                before = {**step.tables, **step.keys}
+                files = {
+                    name: before[name].render()[0].decode("utf-8") if name in before else None
+                    for name in {**before, **after}
+                    if before.get(name) is not after.get(name)
+                }
+                size += len(str(step.operations)) + sum(map(len, filter(None, files.values())))
+                if size > MOST_HISTORY:
+                    break
+                listed.append([step.operations, files])
+                after = before
+        return history
+
+    def restore_history(self, history):
+        """Take over the steps of an earlier session that ended with the present files."""
+        stacks = []
+        for kind in ("undo", "redo"):
+            state, steps = self, []
+            for operations, files in history[kind]:
+                state = Step(operations, *self._replace_states(state, files))
+                steps.append(state)
+            stacks.append(steps[::-1])
+        self._undo_steps, self._redo_steps = stacks
 
     @staticmethod
     def _refuse_edit(keys, owner, key):

@@ -3,7 +3,7 @@
 The journal is a file in the state folder of the user: a header with the SHA-256 of the files of the
 job, then a line of JSON for each edit, with its operations. Each line is on the disk before the
 edit is answered, so that a killed process loses at most the edit that was being written. Save
-begins a new journal.
+begins a new journal, and writes the steps of Undo and Redo to a file beside it.
 """
 
 import hashlib
@@ -67,7 +67,25 @@ class Journal:
         self.source = Path(source).resolve()
         name = hashlib.sha256(str(self.source).encode("utf-8", "surrogateescape")).hexdigest()[:24]
         self.path = Path(folder or find_state_folder()) / "journals" / f"{name}.jsonl"
+        self.history = self.path.with_suffix(".history.json")
         self._digests = None
+
+    def keep_history(self, digests, history):
+        """Write the steps of Undo and Redo that belong to saved files."""
+        content = json.dumps({"files": digests} | _plain(history), ensure_ascii=False)
+        temporary = self.history.with_suffix(".part")
+        with suppress(OSError):
+            temporary.parent.mkdir(parents=True, exist_ok=True)
+            temporary.write_text(content, encoding="utf-8", errors="surrogateescape")
+            temporary.replace(self.history)
+
+    def read_history(self, digests):
+        """Read the steps of `keep_history`; None if another program has changed the files."""
+        with suppress(OSError, ValueError, LookupError, TypeError):
+            text = self.history.read_text(encoding="utf-8", errors="surrogateescape")
+            content = json.loads(text, object_hook=_decode)
+            return content if content["files"] == digests else None
+        return None
 
     def read(self, digests):
         """Read the edits of an earlier session.
