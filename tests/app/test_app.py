@@ -319,6 +319,21 @@ def test_two_windows_see_each_other(client, site, folder):
     assert len(whole["rows"]) > 10
 
 
+def test_own_edits_of_a_page_do_not_contradict_each_other(client, site, folder):
+    key = site.add(folder)
+    seen = client.get(f"/job/{key}/grid/points").json()["revision"]
+
+    def send(page, action):
+        content = {"name": "points", "action": action, "revision": seen, "client": page}
+        return client.post(f"/job/{key}/act", json=content, headers=ORIGIN).status_code
+
+    # Typed faster than the server answers: a row is added, and its cell entered.
+    assert send("a", {"kind": "insert", "row": 0, "count": 1}) == 200
+    assert send("a", {"kind": "enter", "changes": [[0, "z_m", "0,97"]]}) == 200
+    assert send("b", {"kind": "enter", "changes": [[1, "z_m", "0,98"]]}) == 409
+    assert send("a", {"kind": "enter", "changes": [[0, "x_m", "6,5"]]}) == 200
+
+
 @pytest.mark.parametrize("content", [
     b"", b"[]", b"{", b'{"action": 3}', b'{"action": {"kind": "enter"}, "name": "points"}',
     b'{"action": {"kind": "insert", "row": "a", "count": 1}, "name": "points"}',

@@ -1,6 +1,7 @@
 """Pages and answers of the app: language, rendering, errors, and bodies of requests."""
 
 import json
+from collections import Counter
 from contextlib import suppress
 from urllib.parse import parse_qs, quote
 
@@ -149,10 +150,30 @@ def upload_of(request):
     return stored
 
 
+def places_of(check):
+    """Places (table, row, column) of the problems and warnings of a check, by their id."""
+    places = {}
+    for name, marks in check.marks.items():
+        for (row, column), items in marks.items():
+            for mark in items:
+                places.setdefault(id(mark.problem), (name, row, column))
+    return places
+
+
+def count_problems(check):
+    """Number of problems of each table."""
+    if check is None:
+        return Counter()
+    places = places_of(check)
+    known = [places.get(id(problem)) for problem in check.problems]
+    return Counter(place[0] for place in known if place is not None)
+
+
 def render_job(request, job, template, **values):
     """Render a page of a job, with its navigation."""
     desk = job.desk
-    tabs = [(name, desk.reader.title(name)) for name in (*desk.names, *desk.lists)]
+    counts = count_problems(desk.present_check)
+    tabs = [(name, desk.reader.title(name), counts[name]) for name in (*desk.names, *desk.lists)]
     addable = [(name, desk.reader.title(name)) for name in desk.addable]
     common = {
         "may_edit": desk.draft.locked is None and person_of(request).may(EDIT),

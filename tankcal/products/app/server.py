@@ -44,6 +44,7 @@ from tankcal.products.app.pages import (
     list_results,
     permit,
     person_of,
+    places_of,
     read_action,
     read_form,
     read_paper,
@@ -418,7 +419,8 @@ async def act(request):
     action, entered = content.get("action") or {}, ()
     if not isinstance(action, dict) or not isinstance(since, int):
         raise HTTPException(400)
-    kind = action.get("kind")
+    kind, client = action.get("kind"), str(content.get("client", ""))
+    before = desk.draft.revision
     try:
         if kind == "save":
             job.save()
@@ -429,7 +431,7 @@ async def act(request):
         elif kind == "setting":
             enter_setting(desk, action["section"], action["key"], str(action["text"]))
         elif name in (*desk.names, *desk.lists):
-            entered = desk.act(name, action, content.get("revision"))
+            entered = desk.act(name, action, job.seen_revision(content.get("revision"), client))
         else:
             raise HTTPException(404)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
@@ -437,6 +439,7 @@ async def act(request):
     except InputError as error:
         lines = [desk.reader.say(text) for text in error.texts]
         return JSONResponse({"error": "\n".join(lines)}, 409)
+    job.note_edits(before, client)
     if kind in ("save", "autosave", "every"):
         job.publish()
     else:
@@ -482,17 +485,35 @@ async def show_problems(request):
     """Problems and warnings, each with a link to its cell."""
     job = job_of(request)
     await job.check()
-    desk, check = job.desk, job.desk.outcome
-    places = {}
-    for name, marks in check.marks.items():
-        for (row, column), items in marks.items():
-            for mark in items:
-                places.setdefault(id(mark.problem), (name, row, column))
+    check, places = job.desk.outcome, places_of(job.desk.outcome)
+    words = request.app.state.site.words(language_of(request))
     lists = [
-        (level, [(desk.reader.line(problem), link_of(places.get(id(problem)))) for problem in some])
+        (level, [describe_problem(job.desk, words, problem, places.get(id(problem)))
+                 for problem in some])
         for level, some in (("bad", check.problems), ("doubtful", check.warnings))
-    ]
+    ]  # fmt: skip
     return render_job(request, job, "problems", lists=lists, tab="problems")
+
+
+def describe_problem(desk, words, problem, place):
+    """Text of a problem with the labels of its place, and its link."""
+    from tankcal.products.desk.keys import field_of
+
+    if place is None:
+        return desk.reader.line(problem), ""
+    name, row, column = place
+    if name == "job":
+        field = field_of(name, row, column) if row and column else None
+        parts = [words["settings"], field and desk.reader.label(row, field)]
+    else:
+        field = desk.draft.fields(name).get(column) if name in desk.draft.tables else None
+        is_row = isinstance(row, int)
+        parts = [
+            desk.reader.title(name), is_row and f"{words['review']['row'].lower()} {row + 1}",
+            desk.reader.label("", field) if field else column,
+        ]  # fmt: skip
+    text = desk.reader.say(problem.expected)
+    return f"{', '.join(str(part) for part in parts if part)}: {text}", link_of(place)
 
 
 def link_of(place):

@@ -35,6 +35,7 @@ MOST_UPLOAD = 200_000_000  # bytes
 KEPT_UPLOAD_S = 24 * 3600
 UNUSED_S = 3600  # time without a request after which a job is closed
 REGISTER = "register.csv"  # in the workspace
+MOST_EDITORS = 400  # edits of which the page is known
 MOST_WAITING = 64  # events that wait for a window
 
 
@@ -58,6 +59,7 @@ class OpenJob:
         self.key, self.desk, self.lock = key, desk, lock
         self.holder, self.used_s = None, time.monotonic()
         self._has_formulas, self._approval = desk.draft.locked, (None, None)
+        self._editors = {}
         self.run, self.is_autosaved = None, not desk.draft.is_book
         self.check_s, self.saved_s, self.refusal = 0.0, None, ""
         self._windows, self._tasks = set(), {}
@@ -137,6 +139,20 @@ class OpenJob:
         decision = self._approval[1]
         is_present = decision and state_of_results(self.folder, self.out) is State.COMPUTED
         return decision if is_present else None
+
+    # ---- edits of a page
+
+    def note_edits(self, before, client):
+        """Note the page that made the edits since a revision."""
+        for revision in range(before, self.desk.draft.revision):
+            self._editors[revision] = client
+            self._editors.pop(revision - MOST_EDITORS, None)
+
+    def seen_revision(self, revision, client):
+        """Revision that a page has seen; its own edits after it are known there."""
+        while isinstance(revision, int) and client and self._editors.get(revision) == client:
+            revision += 1
+        return revision
 
     # ---- windows
 

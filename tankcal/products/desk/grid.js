@@ -108,6 +108,9 @@ class Grid {
   take() {
     this.rows = this.model.get("rows").map((row) => [...row]);
     this.columns = this.model.get("columns");
+    // An added row is kept until Python has it, but not if Python refuses it.
+    if (this.added && this.rows.length === this.added.row && this.added.times-- > 0) this.rows.push(this.blank());
+    else this.added = null;
     this.locked = this.model.get("locked");
     this.buildTools();
     const heads = this.columns.map((one, place) => element("th", { role: "columnheader",
@@ -315,10 +318,26 @@ class Grid {
     this.goTo(Math.floor(next / width), next % width);
   }
 
+  blank() { return this.columns.map(() => ""); }
+
+  // A blank row after the last, unless that is blank.
+  addRow(column) {
+    const count = this.rows.length;
+    const isBlank = count && this.rows[count - 1].every((cell) => !cell);
+    if (this.locked || isBlank || !this.model.get("takes_rows")) return false;
+    this.added = { row: count, times: 2 };
+    this.rows.push(this.blank());
+    this.send("insert", { row: count, count: 1 });
+    this.draw();
+    this.moveTo(count, column);
+    return true;
+  }
+
   // ---- typing in a cell
 
   beginTyping(text) {
     const [row, column] = this.active;
+    if (!this.rows.length) this.addRow(0);
     if (!this.rows.length || this.isFixed(column)) return;
     const input = element("input", { type: "text", class: "tankcal-input",
       "aria-label": this.columns[column].heading });
@@ -357,7 +376,8 @@ class Grid {
     } else if (goals[event.key]) {
       this.endTyping(true);
       this.pane.focus();
-      this.moveTo(...goals[event.key]);
+      const isBelow = event.key === "Enter" && goals.Enter[0] === this.rows.length;
+      if (!isBelow || !this.addRow(column)) this.moveTo(...goals[event.key]);
     } else return;
     event.preventDefault();
   }
@@ -380,7 +400,9 @@ class Grid {
       PageUp: [row - page, column],
       PageDown: [row + page, column],
     };
-    if (goals[event.key]) this.moveTo(...goals[event.key], event.shiftKey);
+    const isBelow = event.key === "ArrowDown" && !isFar && !event.shiftKey && row === this.rows.length - 1;
+    if (isBelow && this.addRow(column)) this.tell();
+    else if (goals[event.key]) this.moveTo(...goals[event.key], event.shiftKey);
     else if (event.key === "Enter" || event.key === "F2") this.beginTyping();
     else if (event.key === "F8") this.goToMark(event.shiftKey ? -1 : 1);
     else if (event.key === "Delete" || event.key === "Backspace") this.clear();

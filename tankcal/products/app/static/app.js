@@ -16,6 +16,7 @@ function tell(text) {
 // ---- requests; an entry waits for the server if it does not answer
 
 const pending = [];
+const client = Math.random().toString(36).slice(2);  // edits of this page do not contradict each other
 let sending = false;
 
 async function request(address, options = {}) {
@@ -36,7 +37,7 @@ async function flush() {
   while (pending.length) {
     const { content, take } = pending[0];
     try {
-      const body = JSON.stringify({ ...content, since: shown.revision });
+      const body = JSON.stringify({ ...content, client, since: shown.revision });
       const headers = { "content-type": "application/json" };
       const answer = await request(`${job.dataset.job}/act`, { method: "POST", headers, body });
       pending.shift();
@@ -58,6 +59,16 @@ async function flush() {
   sending = false;
 }
 
+// Entries that are on their way arrive before the page is left.
+function whenSent(act) { if (pending.length) setTimeout(whenSent, 50, act); else act(); }
+for (const kind of ["click", "submit"]) {
+  document.addEventListener(kind, (event) => {
+    const target = kind === "click" ? event.target.closest?.("a[href]") : event.target;
+    if (!pending.length || !target) return;
+    event.preventDefault();
+    whenSent(() => kind === "click" ? target.click() : target.requestSubmit(event.submitter));
+  }, true);
+}
 window.addEventListener("beforeunload", (event) => { if (pending.length) event.preventDefault(); });
 
 // ---- state of the job: saved, Undo, Redo, problems
@@ -129,7 +140,9 @@ function listenToForm() {
     for (const [name, [text, level, problem]] of Object.entries(state.fields ?? {})) {
       const field = $(`f-${name}`);
       if (!field) continue;
-      if (!typed.has(field) && field.value !== text) field.value = text;
+      const { section, key } = field.dataset;
+      const isSent = pending.every(({ content: { action } }) => action.section !== section || action.key !== key);
+      if (isSent && !typed.has(field) && field.value !== text) field.value = text;
       field.closest(".field").className = `field ${level}`;
       field.toggleAttribute("aria-invalid", level === "bad");
       if (level === "bad") field.setAttribute("aria-invalid", "true");
@@ -248,7 +261,7 @@ function listenToDrop(place) {
 function goToProblem(step) {
   if (model) { model.tell("msg:custom", { kind: "next", step }); return; }
   const marked = [...document.querySelectorAll(".field.bad, .field.doubtful")];
-  if (!marked.length) { if (job) location.assign(`${job.dataset.job}/problems`); return; }
+  if (!marked.length) { if (job) whenSent(() => location.assign(`${job.dataset.job}/problems`)); return; }
   const now = marked.indexOf(document.activeElement.closest?.(".field"));
   const next = marked[(now + step + marked.length) % marked.length];
   const fold = next.closest("details");
@@ -267,7 +280,7 @@ document.addEventListener("keydown", (event) => {
   else if (isFar && event.key === "Enter") {
     document.activeElement.blur?.();
     const start = $("start");
-    if (start) start.requestSubmit(); else location.assign(`${job.dataset.job}/results`);
+    if (start) start.requestSubmit(); else whenSent(() => location.assign(`${job.dataset.job}/results`));
   } else if (isFar && !event.shiftKey && key === "z" && !event.target.matches("input")) act({ kind: "undo" });
   else if (isFar && (key === "y" || (event.shiftKey && key === "z")) && !event.target.matches("input")) act({ kind: "redo" });
   else if (event.altKey && /^[1-9]$/.test(event.key)) document.querySelectorAll("nav li a")[event.key - 1]?.click();
