@@ -126,7 +126,7 @@ def test_edits_are_checked_saved_and_computed(browser, folder):
     assert browser.run(f"document.querySelector('{height}').ariaInvalid") == "true"
     browser.wait_for("document.querySelector('#count').textContent.includes('Problemas: 1')")
     follow(browser, "#count")
-    assert "courses.csv, linha 3, height_m" in browser.text(".findings")
+    assert "Anéis, linha 2, Altura: " in browser.text(".findings")
     follow(browser, ".findings a")
     browser.wait_for(f"document.querySelector('{height}.tankcal-active')")
 
