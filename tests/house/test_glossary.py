@@ -14,7 +14,10 @@ OTHERS = [one for one in LANGUAGES if one != DEFAULT]
 # {language: {what is said: patterns of what is not}}; \b stands for the edge of a word
 GLOSSARY = {
     "pt-BR": {
-        "serviço": (r"\btrabalhos?\b(?<!pasta de trabalho)(?<!pastas de trabalho)", r"\bo job\b"),
+        "serviço": (
+            r"\btrabalhos?\b(?<!pasta de trabalho)(?<!área de trabalho)(?<!pastas de trabalho)",
+            r"\bo job\b",
+        ),
         "posição do ponto": (r"lugar do ponto", r"novo lugar"),
         "interpolação linear": (r"reta entre", r"linha reta entre"),
         "arredondamento": (r"último algarismo",),

@@ -23,6 +23,7 @@ from tankcal.products.desk.review import Act
 from tankcal.products.desk.states import State, state_of_results
 
 MOST_SHOWN = 200  # changes on the page
+MOST_DIGITS = 9  # of the number of a remark
 PERMISSION_OF = {
     Act.SUBMITTED: EDIT, Act.REMARK: REVIEW, Act.RESOLVED: EDIT, Act.RETURNED: REVIEW,
     Act.REVIEWED: REVIEW, Act.APPROVED: APPROVE, Act.REVISED: APPROVE,
@@ -156,7 +157,7 @@ async def decide(request):
     number = form.get("number", "")
     review.add_event(
         draft, act, person.name or form.get("name", ""), sha256, form.get("text", ""), place,
-        int(number) if number.isdecimal() else 0,
+        int(number) if number.isdecimal() and len(number) <= MOST_DIGITS else 0,
     )  # fmt: skip
     job.follow_lock()
     if act is Act.REVISED:

@@ -796,12 +796,10 @@ async def show_what_if(request):
 
         paper = read_paper(job, language)
         known = what_if.list_recorded_budgets(paper)
-        numbers = [number for number, _ in known]
-        text = query.get("budget", "")
-        number = int(text) if text.isdecimal() and int(text) in numbers else None
-        if number is None and not numbers:
+        numbers = {str(number): number for number, _ in known}
+        if not numbers:
             return {"budgets": [], "number": None, "lines": [], "sentences": [], "table": ""}
-        number = numbers[0] if number is None else number
+        number = numbers.get(query.get("budget"), known[0][0])
         changed = what_if.change_recorded_budget(paper, number, read_factors(query))
         return {
             "budgets": known, "number": number, "sentences": what_if.budget_sentences(
