@@ -183,7 +183,7 @@ def test_years_without_a_fault_have_no_alarm(table, seed):
 def test_false_alarms_of_fifty_years(table):
     """50 years without a fault by a generator that is not the model, at a promised rate of 5 %.
 
-    A limit by the model alone gave 9 alarms in 16 years. docs/studies/upkeep.md has 200 years.
+    A limit by the model alone gave 9 alarms in 16 years. docs/studies/upkeep.md has 228 years.
     """
     alarms = 0
     for seed in range(50):
