@@ -19,7 +19,9 @@ ROOT = Path(__file__).parents[2]
 WORDS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 LANGUAGES = {"pt-BR": "pt", "es": "es"}  # of our words, of the dictionary
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-CODE = re.compile(r"`[^`]*`|\]\([^)]*\)|^    .*$|\[[^\]]*\]\((?!\S*(?:-es|-pt-BR|aqui)\.md)", re.M)
+CODE = re.compile(
+    r"`[^`]*`|\]\([^)]*\)|^    .*$|\[[^\]]*\]\((?!\S*(?:-es|-pt-BR|aqui)\.md)[^)]*\)", re.M
+)
 WORD = re.compile(r"[^\W\d_]{3,}")
 
 

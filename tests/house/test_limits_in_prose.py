@@ -524,8 +524,8 @@ LIMITS += [
     ("docs/upkeep.md", "(u over () % of the content)", [PERCENT * results_of_upkeep.WIDE]),
     (
         "docs/upkeep.md",
-        "blocks of () days of the tank's own innovations. Below () days the limit is provisional: "
-        "() times that of the model. A cause is named only if no other cause is within () of",
+        "of blocks of () days of the tank. Below () days the limit is provisional, () times that "
+        "of the model. A cause is named only if no other cause is within () of",
         [watching.BLOCK_DAYS, watching.LEAST_TANK_DAYS, watching.PROVISIONAL, watching.ALIKE],
     ),
     (
