@@ -465,6 +465,47 @@ def test_a_field_book_is_imported(client, site):
     assert len(client.get(f"/job/{key}/grid/wall_hits").json()["rows"]) == 200
 
 
+def send_folder(client, name, files):
+    """Send a folder {path: bytes} as the page does; return the address of its page."""
+    body = json.dumps([[path, len(data)] for path, data in files.items()]).encode() + b"\n"
+    body += b"".join(files.values())
+    answer = client.post(f"/upload?name={name}&folder=yes&job=x", content=body, headers=ORIGIN)
+    assert answer.status_code == 200, answer.text
+    return answer.json()["address"]
+
+
+def test_a_job_folder_becomes_a_job(client, site, folder):
+    files = {f"tank 9/{path.name}": path.read_bytes() for path in folder.iterdir()}
+    strange = ("tank 9/../../out.csv", "tank 9/a\\b.csv", "tank 9/c:x.csv",
+               "tank 9/.git/config", "tank 9/results/x.csv")  # fmt: skip
+    address = send_folder(client, "tank 9", files | dict.fromkeys(strange, b"x"))
+    words = load_words("pt-BR")["app"]
+    assert words["file_kinds"]["job_folder"] in client.get(address).text
+    answer = client.post(f"{address}/job", headers=ORIGIN)
+    assert answer.status_code == 303, answer.text
+    copy = site.workspace / "tank-9"
+    assert {path.name for path in copy.iterdir()} == {path.name for path in folder.iterdir()}
+    assert (copy / "points.csv").read_bytes() == (folder / "points.csv").read_bytes()
+    assert client.get(answer.headers["location"]).status_code == 200
+    page = client.get(send_folder(client, "tank 9", files)).text  # the same folder again
+    assert f'href="{answer.headers["location"]}"' in page
+    # Settings that cannot be read are shown; a folder without a job is not known.
+    address = send_folder(client, "bad", {"bad/job.toml": b"\xff\xfe\x00"})
+    answer = client.post(f"{address}/job", headers=ORIGIN)
+    assert client.get(answer.headers["location"]).status_code == 200
+    assert sorted(path.name for path in site.workspace.iterdir()) == ["bad", "tank-9"]
+    page = client.get(send_folder(client, "photos", {"photos/a.txt": b"abc"})).text
+    assert words["file_kinds"]["unknown"] in page
+
+
+@pytest.mark.parametrize("body", [b"", b'[["a", 5]]\nab', b'[["a", -1]]\n', b'[["a"]]\n',
+                                  b'[[1, 1]]\na', b"x", b"5"])  # fmt: skip
+def test_broken_folders_are_refused(client, site, body):
+    answer = client.post("/upload?name=a&folder=yes", content=body, headers=ORIGIN)
+    assert answer.status_code == 400
+    assert not any((site.state / "uploads").iterdir())
+
+
 def test_too_large_and_strange_uploads_are_refused(client, site, monkeypatch):
     monkeypatch.setattr("tankcal.products.app.site.MOST_UPLOAD", 1000)
     answer = client.post("/upload?name=a.csv", content=b"x" * 1001, headers=ORIGIN)

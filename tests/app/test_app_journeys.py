@@ -107,11 +107,11 @@ class Keyboard:
         self.errors += [item for item in self.browser.complaints if "409" not in str(item)]
         self.browser.events.clear()
 
-    def give_file(self, path):
-        """Open the chooser of files by a key, and choose a file."""
+    def give_file(self, path, selector="input[type=file]"):
+        """Open the chooser of files by a key, and choose a file or folder."""
         self.browser.ask("Page.setInterceptFileChooserDialog", enabled=True)
         self.browser.events.clear()
-        self.reach("input[type=file]")
+        self.reach(selector)
         self.browser.run("window.tankcalLeft = true")
         self.press("Enter")
         for _ in range(200):
@@ -420,6 +420,36 @@ def test_an_old_certificate_is_read_and_compared(folder, keys, language):
     assert status in (200, 409)
     keys.reach("a[data-test]")
     keys.press("Enter")
+
+
+def test_a_folder_is_dropped_or_chosen(folder, keys, language, state):
+    words, browser = words_of(language), keys.browser
+    # Results: shown, and offered beside the tank to which they belong.
+    browser.run("window.tankcalLeft = true")
+    x, y = browser.run("(({x, y}) => [x + 9, y + 9])(document.querySelector('.drop')"
+                       ".getBoundingClientRect())")  # fmt: skip
+    data = {"items": [], "files": [str(folder / "results")], "dragOperationsMask": 1}
+    for kind in ("dragEnter", "dragOver", "drop"):
+        browser.ask("Input.dispatchDragEvent", type=kind, x=x, y=y, data=data)
+    keys.arrive()
+    assert browser.text("h1") == "results"
+    assert words["file_kinds"]["folder"] in browser.text("main")
+    assert words["as_certificate"] in browser.text("details summary")
+    assert browser.text(".actions") == words["open_known"].format(tank=folder.name)
+    view = browser.run("fetch(document.querySelector('iframe.paper').src).then(one => one.status)")
+    assert view == 200
+    compare = browser.run("fetch(document.querySelector('main a[target=paper]').href)"
+                          ".then(one => one.status)")  # fmt: skip
+    assert compare == 200
+    # A job: becomes a job of the workspace.
+    keys.follow(".brand")
+    keys.give_file(folder, "input[webkitdirectory]")
+    assert words["file_kinds"]["job_folder"] in browser.text("main")
+    keys.follow('form[action$="/job"] button')
+    browser.wait_for("document.querySelector('[data-section]')", SLOW_S)
+    copy = state / "workspace" / f"{folder.name}-2"
+    assert (copy / "job.toml").read_bytes() == (folder / "job.toml").read_bytes()
+    assert not (copy / "results").exists()
 
 
 def test_the_owner_of_a_station_gets_a_chart(keys, language, state):

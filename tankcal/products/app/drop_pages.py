@@ -1,7 +1,9 @@
 """Pages of a dropped file that belongs to no job: record, certificate, former table."""
 
 import asyncio
+import hashlib
 import shutil
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -9,8 +11,12 @@ from starlette.exceptions import HTTPException
 from starlette.responses import HTMLResponse
 
 from tankcal.errors import InputError
+from tankcal.products.app import folders
 from tankcal.products.app.guard import REPORT_POLICY
-from tankcal.products.app.pages import language_of, read_record, render, upload_of
+from tankcal.products.app.pages import language_of, read_record, redirect, render, upload_of
+from tankcal.products.app.site import MOST_UPLOAD
+from tankcal.products.desk.jobs import free_folder
+from tankcal.record.manifest import digest_of
 
 MOST_LINES = 200  # findings on the page
 
@@ -22,23 +28,39 @@ async def show_upload(request):
     kind, content = await asyncio.to_thread(_examine, site, stored, reader)
     jobs = await asyncio.to_thread(site.list_recent)
     comparable = [
-        (key, item) for key, item in jobs if item.state.record_sha256 and kind in COMPARABLE
-    ]
+        (key, item) for key, item in jobs
+        if item.state.record_sha256 and (kind in COMPARABLE or content["record"])
+    ]  # fmt: skip
+    known = [(key, item) for key, item in jobs if content["sha256"] & set(_digests(item))]
     return render(
         request, "upload", kind=str(kind), name=stored.name, jobs=jobs, comparable=comparable,
-        upload=request.path_params["upload"], **content,
+        known=known, upload=request.path_params["upload"], **content,
     )  # fmt: skip
 
 
 COMPARABLE = ("pdf", "table", "record")
 
 
+def _digests(item):
+    """SHA-256 of the record and of the settings or workbook of a `RecentJob`."""
+    if item.state.record_sha256:
+        yield item.state.record_sha256
+    with suppress(OSError):
+        yield digest_of(item.source / "job.toml" if item.source.is_dir() else item.source)
+
+
 def _examine(site, stored, reader):
     """Kind of a file, and the content of its page."""
     from tankcal.products.desk.proposals import Kind, kind_of
 
-    data, content = stored.path.read_bytes(), {"lines": [], "summaries": [], "record": ""}
+    content = {"lines": [], "summaries": [], "record": "", "sha256": set()}
+    files = folders.list_folder(stored.path, MOST_UPLOAD)
+    if folders.find_job_file(files) or folders.find_results(files) is not None:
+        return _examine_folder(site, stored, files, reader, content)
+    data = stored.path.read_bytes()
     kind = kind_of(data)
+    if kind is Kind.RECORD:
+        content["sha256"] = {hashlib.sha256(data).hexdigest()}
     if kind not in (Kind.PDF, Kind.TABLE):
         return kind, content
     with TemporaryDirectory() as folder:
@@ -46,9 +68,7 @@ def _examine(site, stored, reader):
         if kind is Kind.PDF:
             record = read_embedded_record(path)
             if record is not None:
-                key, embedded = site.new_upload("record.json")
-                embedded.path.write_bytes(record)
-                content["record"] = key
+                _keep_record(site, record, content)
         examine = _assess if content["record"] else _lint
         try:
             content |= examine(path, reader)
@@ -56,6 +76,49 @@ def _examine(site, stored, reader):
             if kind is Kind.PDF:  # any table of measurements fails as a capacity table
                 content["lines"] = [reader.say(text) for text in error.texts]
     return kind, content
+
+
+def _keep_record(site, record, content):
+    """Add a record (bytes) to the content of the page."""
+    key, stored = site.new_upload("record.json")
+    stored.path.write_bytes(record)
+    content["record"] = key
+    content["sha256"].add(hashlib.sha256(record).hexdigest())
+
+
+def _examine_folder(site, stored, files, reader, content):
+    """Kind of a sent folder, and the content of its page: record and findings of its results."""
+    job_file, results = folders.find_job_file(files), folders.find_results(files)
+    if job_file:
+        data = folders.read_member(stored.path, files[job_file])
+        content["sha256"].add(hashlib.sha256(data).hexdigest())
+    if results is not None:
+        with TemporaryDirectory() as folder:
+            for name in (folders.RECORD, folders.CERTIFICATE):
+                if results + name in files:
+                    data = folders.read_member(stored.path, files[results + name])
+                    (Path(folder) / name).write_bytes(data)
+            _keep_record(site, (Path(folder) / folders.RECORD).read_bytes(), content)
+            try:
+                content |= _assess(folder, reader)
+            except InputError as error:
+                content["lines"] = [reader.say(text) for text in error.texts]
+    return "job_folder" if job_file else "folder", content
+
+
+async def open_sent_job(request):
+    """Copy an uploaded job, a workbook or a folder, to the workspace, and open it."""
+    stored, site = upload_of(request), request.app.state.site
+    files = folders.list_folder(stored.path, MOST_UPLOAD)
+    if folders.find_job_file(files):
+        folder = await asyncio.to_thread(
+            folders.copy_sent_job, stored.path, files, site.workspace, stored.name
+        )
+    else:
+        folder = free_folder(site.workspace, Path(stored.name).stem)
+        folder.mkdir(parents=True)
+        (folder / "job.xlsx").write_bytes(stored.path.read_bytes())
+    return redirect(request, f"/job/{site.add(folder)}/")
 
 
 def _copy_with_name(stored, folder, kind=""):

@@ -22,7 +22,13 @@ from starlette.responses import (
 from starlette.routing import Mount, Route
 
 from tankcal.errors import InputError, TankcalError
-from tankcal.products.app.drop_pages import compare_upload, show_upload, view_record
+from tankcal.products.app.drop_pages import (
+    compare_upload,
+    open_sent_job,
+    show_upload,
+    view_record,
+)
+from tankcal.products.app.folders import pack_sent_folder
 from tankcal.products.app.guard import LANGUAGE_COOKIE, REPORT_POLICY
 from tankcal.products.app.office_pages import (
     create_from_chart,
@@ -114,7 +120,7 @@ def make_application(site, base=""):
         Route("/open", permit(EDIT, open_place), methods=post),
         Route("/upload", permit(EDIT, upload), methods=post),
         Route("/import/{upload:str}", show_upload, methods=get),
-        Route("/import/{upload:str}/job", permit(EDIT, open_workbook), methods=post),
+        Route("/import/{upload:str}/job", permit(EDIT, open_sent_job), methods=post),
         Route("/import/{upload:str}/view", view_record, methods=get),
         Route("/import/{upload:str}/compare/{key:str}", compare_upload, methods=get),
         Route("/field-sheet/{survey:str}", send_field_sheet, methods=get),
@@ -276,12 +282,12 @@ async def open_place(request):
 
 
 async def upload(request):
-    """Receive a file as the body of the request, and answer with the address of its import."""
+    """Receive a file or a folder as the body, and answer with the address of its import."""
     from tankcal.products.app.site import MOST_UPLOAD
 
     site = request.app.state.site
     key, stored = site.new_upload(request.query_params.get("name", "file"))
-    size = 0
+    size, is_folder = 0, request.query_params.get("folder") == "yes"
     try:
         with stored.path.open("wb") as file:
             async for part in request.stream():
@@ -289,23 +295,14 @@ async def upload(request):
                 if size > MOST_UPLOAD:
                     raise HTTPException(413)
                 await asyncio.to_thread(file.write, part)
+        if is_folder:
+            await asyncio.to_thread(pack_sent_folder, stored.path)
     except BaseException:
         stored.path.unlink(missing_ok=True)
         raise
-    job = request.query_params.get("job", "")
+    job = "" if is_folder else request.query_params.get("job", "")
     place = f"/job/{job}/import/{key}" if site.path(job) is not None else f"/import/{key}"
     return JSONResponse({"address": f"{request.app.state.base}{place}"})
-
-
-async def open_workbook(request):
-    """Copy an uploaded job workbook to the workspace and open it."""
-    from tankcal.products.desk.jobs import free_folder
-
-    stored, site = upload_of(request), request.app.state.site
-    folder = free_folder(site.workspace, Path(stored.name).stem)
-    folder.mkdir(parents=True)
-    (folder / "job.xlsx").write_bytes(stored.path.read_bytes())
-    return redirect(request, f"/job/{site.add(folder)}/")
 
 
 async def send_field_sheet(request):

@@ -233,26 +233,52 @@ function takeRun(run) {
 
 // ---- files
 
+const MOST_FILES = 2000;  // as in folders.py
+
+// Files of a folder with their paths, without hidden files.
+async function readFolder(entry, path, files) {
+  if (entry.name.startsWith(".") || files.length > MOST_FILES) return files;
+  if (entry.isFile) files.push([path, await new Promise((done, fail) => entry.file(done, fail))]);
+  else for (const reader = entry.createReader(); ;) {
+    const items = await new Promise((done, fail) => reader.readEntries(done, fail));
+    if (!items.length) break;
+    for (const item of items) await readFolder(item, `${path}/${item.name}`, files);
+  }
+  return files;
+}
+
 function listenToDrop(place) {
-  const [input, status] = [place.querySelector("input"), place.querySelector("[role=status]")];
-  const take = async (file) => {
+  const [input, folder] = place.querySelectorAll("input");
+  const status = place.querySelector("[role=status]");
+  const take = async (file, isFolder = false) => {
     if (!file) return;
     if (file.size > 200e6) { status.textContent = texts.tooLarge; return; }
     status.textContent = texts.sending.replace("{file}", file.name);
     const address = new URL(place.dataset.drop, location.href);
     address.searchParams.set("name", file.name);
+    if (isFolder) address.searchParams.set("folder", "yes");
     try {
       const answer = await request(address, { method: "POST", body: file });
       location.assign(answer.address);
     } catch (error) { status.textContent = error.message; }
   };
+  // A list of the paths and sizes, and the contents of the files behind it.
+  const takeFolder = (files) => {
+    if (files.length > MOST_FILES) { status.textContent = texts.tooLarge; return; }
+    const list = JSON.stringify(files.map(([path, file]) => [path, file.size]));
+    take(new File([list, "\n", ...files.map(([, file]) => file)], files[0]?.[0].split("/")[0] ?? "-"), true);
+  };
   input.addEventListener("change", () => take(input.files[0]));
+  if (!("webkitdirectory" in folder)) status.textContent = texts.noFolder;
+  folder.addEventListener("change", () => takeFolder([...folder.files].map((file) => [file.webkitRelativePath, file])));
   place.addEventListener("dragover", (event) => { event.preventDefault(); place.classList.add("over"); });
   place.addEventListener("dragleave", () => place.classList.remove("over"));
   place.addEventListener("drop", (event) => {
     event.preventDefault();
     place.classList.remove("over");
-    take(event.dataTransfer.files[0]);
+    const entry = event.dataTransfer.items[0]?.webkitGetAsEntry?.();
+    if (entry?.isDirectory) readFolder(entry, entry.name, []).then(takeFolder, (error) => tell(error.message));
+    else take(event.dataTransfer.files[0]);
   });
 }
 
