@@ -16,6 +16,7 @@ from tankcal.products.assess.assessing import REQUIREMENTS, assess, plain_assess
 from tankcal.products.assess.evidence import CERTIFICATE
 from tankcal.products.assess.paper import DOCUMENT, AssessmentPaper
 from tankcal.products.assess.requirements import MAJOR, MEMORY, OBSERVATION, READ, SUMMARY
+from tankcal.products.assess.saved import ASSESSMENT
 from tankcal.products.assess.wording import LABELS, PLACEHOLDER, find_claim, find_interval
 from tankcal.report.outputs import RECORD
 from tankcal.text.shipped import LANGUAGES
@@ -531,6 +532,29 @@ def test_only_clauses_that_were_read_are_cited_as_read():
         *(("JCGM 100:2008", clause) for clause in ("5.2", "5.1.3", "4.2, 4.3", "4.3")),
     }  # fmt: skip
     assert {r.basis for r in REQUIREMENTS} == {READ, SUMMARY, MEMORY}
+
+
+PLACES = {
+    "certificate.number": ("Certificate number", "Número do certificado", "Número del certificado"),
+    "capacity.U_m3": ("Capacity table: U", "Tabela volumétrica: U", "Tabla de capacidad: U"),
+    "budgets[1]": ("Uncertainty budget 2", "Balanço de incerteza 2", "Balance de incertidumbre 2"),
+    "instruments.tape": ("Measuring equipment: tape", "Equipamentos de medição: tape",
+                         "Equipos de medición: tape"),
+    "volume_m3, 12": ("volume_m3, 12",) * 3,
+}  # fmt: skip
+
+
+def test_the_place_of_a_finding_has_the_label_of_the_form():
+    plain = {
+        "format": ASSESSMENT.format, "tankcal": "1", "notice": "", "source": "x", "tank": None,
+        "day": "2026-11-30", "number": None, "laboratory": None, "software": None,
+        "language": None, "requirements": [], "findings": [],
+    }  # fmt: skip
+    for place, language in enumerate(("en", "pt-BR", "es")):
+        paper = AssessmentPaper(plain, language)
+        for section, names in PLACES.items():
+            finding = {"file": RECORD, "page": None, "section": section}
+            assert paper.place(finding) == f"{RECORD}, {names[place]}"
 
 
 @pytest.mark.parametrize("language", LANGUAGES)

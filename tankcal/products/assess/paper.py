@@ -1,5 +1,6 @@
 """Document of an assessment: assessment.json, CSV files, workbook and report for the file."""
 
+import re
 from typing import ClassVar
 
 from tankcal.messages import message
@@ -9,8 +10,11 @@ from tankcal.report import blocks
 from tankcal.report.plain import words_with_part
 from tankcal.report.saved_document import SavedDocument, SavedPaper, bearable
 from tankcal.report.tables import Column, Table
+from tankcal.text.naming import split_unit
 from tankcal.text.shipped import DEFAULT
 from tankcal.text.words import load_words, message_sentence
+
+RECORD_PARTS = {"budgets": "budget", "instruments": "equipment"}  # parts with another heading
 
 
 class AssessmentPaper(SavedPaper):
@@ -62,8 +66,19 @@ class AssessmentPaper(SavedPaper):
     def place(self, finding):
         """Return file, page and section of a finding."""
         page = self.word("texts.page", page=finding["page"]) if finding["page"] else ""
-        section = self.words["labels_of_text"].get(finding["section"], finding["section"])
+        section = self._name_section(finding["section"])
         return bearable(", ".join(filter(None, (finding["file"], page, section))))
+
+    def _name_section(self, section):
+        """Name of a section: label of a setting, or heading of a part of the record."""
+        labels = self.words["desk"]["labels"] | self.words["labels_of_text"]
+        part, *steps = re.findall(r"[^.[\]]+", section) or [""]
+        heading = self.words["headings"].get(RECORD_PARTS.get(part, part))
+        if section in labels or heading is None:
+            return labels.get(section, section)
+        if part == "budgets":  # counted from 1
+            return f"{heading} {int(steps[0]) + 1}"
+        return f"{heading}: {split_unit(steps[0])[0]}" if steps else heading
 
     def verdict(self):
         """Return the sentence on the number of findings of each grade."""
