@@ -349,6 +349,31 @@ def test_broken_requests_are_refused(client, site, folder, content):
     assert client.get(f"/job/{key}/grid/points").status_code == 200
 
 
+def test_an_entry_of_a_page_of_an_earlier_server_is_not_made(client, site, folder):
+    key = site.add(folder)
+    reading = client.get(f"/job/{key}/changes?since=0").json()["desk"]
+    before = (folder / "courses.csv").read_bytes()
+    content = {"name": "courses", "action": {"kind": "enter", "changes": [[0, "height_m", "1,7"]]},
+               "revision": 0, "since": 0}  # fmt: skip
+    for desk, status in (("another", 412), (None, 412), (reading, 200)):
+        assert (folder / "courses.csv").read_bytes() == before
+        answer = client.post(f"/job/{key}/act", json=content | {"desk": desk}, headers=ORIGIN)
+        assert answer.status_code == status
+    assert f'data-desk="{reading}"' in client.get(f"/job/{key}/").text
+    site.close()  # saves what waits for its pause
+    assert b"1.7" in (folder / "courses.csv").read_bytes()
+
+
+def test_a_restarted_app_has_the_port_of_the_last_unless_it_is_taken(tmp_path):
+    with serving.free_socket("127.0.0.1") as first:
+        port = first.getsockname()[1]
+        serving.write_state(tmp_path, f"http://127.0.0.1:{port}/?token=x")
+        with serving.last_socket("127.0.0.1", tmp_path) as other:
+            assert other.getsockname()[1] != port
+    with serving.last_socket("127.0.0.1", tmp_path) as again:
+        assert again.getsockname()[1] == port
+
+
 def test_files_changed_by_another_program_are_read_again(client, site, folder):
     key = site.add(folder)
     client.get(f"/job/{key}/grid/points")

@@ -9,6 +9,7 @@ import re
 import signal
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -37,10 +38,8 @@ def folder(tmp_path_factory):
     return folder
 
 
-@pytest.fixture(scope="module")
-def address(folder, tmp_path_factory):
-    """Address of an app with this job; it must end on Ctrl-C."""
-    state = tmp_path_factory.mktemp("state")
+def start(folder, state):
+    """Start an app with this job; return its process and its address."""
     environment = {**os.environ, "PYTHONUNBUFFERED": "1", "LANG": "C", "TANKCAL_STATE": str(state)}
     command = [sys.executable, "-m", "tankcal", "app", str(folder), "--no-browser"]
     command += ["--workspace", str(state / "workspace"), "--language", "pt-BR"]
@@ -48,17 +47,31 @@ def address(folder, tmp_path_factory):
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment,
         start_new_session=True, preexec_fn=heed_ctrl_c,
     )  # fmt: skip
+    line = process.stdout.readline()
+    found = re.search(r"http://127\.0\.0\.1:\d+/\S*", line)
+    assert found, line + process.stdout.read()
+    return process, found.group()
+
+
+@contextmanager
+def ended(process):
+    """End an app by Ctrl-C."""
     try:
-        line = process.stdout.readline()
-        found = re.search(r"http://127\.0\.0\.1:\d+/\S*", line)
-        assert found, line + process.stdout.read()
-        yield found.group()
+        yield
         process.send_signal(signal.SIGINT)
         assert process.wait(30) == 0
     finally:
         if process.poll() is None:
             process.kill()
             process.wait(20)
+
+
+@pytest.fixture(scope="module")
+def address(folder, tmp_path_factory):
+    """Address of an app with this job; it must end on Ctrl-C."""
+    process, address = start(folder, tmp_path_factory.mktemp("state"))
+    with ended(process):
+        yield address
 
 
 @pytest.fixture
@@ -217,6 +230,44 @@ def test_two_windows_show_the_same_job(browser, folder, address):
         other.wait_for(f"{field}.value === '2026/118'")
     saved(browser)
     assert 'number = "2026/118"' in (folder / "job.toml").read_text()
+
+
+def test_entries_wait_for_a_server_that_was_stopped(tmp_path):
+    words, folder = load_words("pt-BR")["app"], write_job(tmp_path / "T-2", rings=2)
+    bar = "document.querySelector('#bar').innerText"
+    path, [first, second] = folder / "courses.csv", [cell(row, "height_m") for row in (0, 1)]
+    with Browser(THIS_MACHINE) as browser:
+        process, address = start(folder, tmp_path / "state")
+        with ended(process):
+            browser.visit(address)
+            browser.wait_for("document.querySelector('#saved').textContent", SLOW_S)
+            follow(browser, 'nav a[href$="table/courses"]')
+            browser.wait_for(f"document.querySelector('{first}')", SLOW_S)
+            browser.click(first)
+            browser.write("1,7")
+            browser.press("Enter", 13)
+            browser.wait_for("document.querySelector('#count').textContent")
+        # Stopped within the pause before saving: the entry is saved at the end.
+        assert "1.7" in path.read_text().splitlines()[1]
+        assert browser.wait_for(bar) == words["offline"]
+        browser.click(second)
+        browser.write("1,8")
+        browser.press("Enter", 13)
+        assert browser.text(second) == "1,8"
+        before = path.read_text()
+        process, again = start(folder, tmp_path / "state")
+        with ended(process):
+            assert again.split("?")[0] == address.split("?")[0]
+            assert again != address
+            # The page of the stopped server has no access until the new address was opened.
+            browser.wait_for(f"{bar} === {words['restarted']!r}", SLOW_S)
+            assert path.read_text() == before
+            browser.ask("Target.createTarget", url=again)
+            browser.wait_for(f"{bar} === ''", SLOW_S)
+            browser.wait_for("document.querySelector('#saved').textContent === 'Salvo'", SLOW_S)
+            lines = path.read_text().splitlines()
+            assert [line.split(",")[1] for line in lines[1:3]] == ["1.7", "1.8"]
+            assert [browser.text(place) for place in (first, second)] == ["1,7", "1,8"]
 
 
 def test_a_file_becomes_the_points_of_a_new_tank(browser, address):

@@ -132,7 +132,10 @@ def run_app(options):
         if not options.no_browser:
             serving.open_browser(address)
         return
-    bound = serving.free_socket(options.address, options.port)
+    if is_second:
+        bound = serving.last_socket(options.address, site.state)
+    else:
+        bound = serving.free_socket(options.address, options.port)
     port, token = bound.getsockname()[1], serving.new_token()
     names = {options.address, socket.gethostname().lower(), socket.getfqdn().lower()}
     hosts = [*serving.LOCAL_NAMES] if is_local else sorted(names)

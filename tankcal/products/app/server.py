@@ -416,6 +416,8 @@ async def act(request):
     action, entered = content.get("action") or {}, ()
     if not isinstance(action, dict) or not isinstance(since, int):
         raise HTTPException(400)
+    if content.get("desk", job.reading) != job.reading:  # its revisions are not ours
+        return JSONResponse({"error": ""}, 412)
     kind, client = action.get("kind"), str(content.get("client", ""))
     before = desk.draft.revision
     try:

@@ -19,6 +19,7 @@ from tankcal.products.desk.journal import find_state_folder
 HERE = "127.0.0.1"  # address that only this machine can reach
 LOCAL_NAMES = ("127.0.0.1", "localhost", "[::1]")
 STATE_FILE = "app.json"  # address and process of the running app
+PORT_FILE = "port"  # last port, so that open pages find a restarted app
 GRACE_S = 1  # time that open event streams get at the end
 
 
@@ -42,6 +43,17 @@ def free_socket(address, port=0):
         raise InputError(Problem("--port" if port else "--address", expected)) from error
     bound.set_inheritable(True)
     return bound
+
+
+def last_socket(address, folder):
+    """Bind the last port of the app of this user unless it is in use, else any free port."""
+    with suppress(OSError, ValueError, InputError):
+        port = int((folder / PORT_FILE).read_text())
+        with socket.socket() as trial:
+            trial.settimeout(1)
+            if trial.connect_ex((address, port)):
+                return free_socket(address, port)
+    return free_socket(address)
 
 
 def default_workspace():
@@ -85,6 +97,7 @@ def write_state(folder, address):
     handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     with os.fdopen(handle, "w", encoding="utf-8") as file:
         json.dump({"address": address, "process": os.getpid()}, file)
+    (folder / PORT_FILE).write_text(address.split("/")[2].rpartition(":")[2])
     return path
 
 
@@ -141,6 +154,7 @@ __all__ = [
     "find_state_folder",
     "free_socket",
     "guard_application",
+    "last_socket",
     "new_token",
     "open_browser",
     "open_browser_meanwhile",

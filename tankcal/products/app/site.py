@@ -57,6 +57,7 @@ class OpenJob:
 
     def __init__(self, key, desk, lock):
         self.key, self.desk, self.lock = key, desk, lock
+        self.reading = secrets.token_hex(8)  # revisions count from this reading of the files
         self.holder, self.used_s = None, time.monotonic()
         self._has_formulas, self._approval = desk.draft.locked, (None, None)
         self._editors = {}
@@ -255,6 +256,7 @@ class OpenJob:
         """State of the job for all windows."""
         run = None if self.run is None else self.run.show(self.desk.reader.language)
         return describe_state(self.desk) | {
+            "desk": self.reading,
             "run": run,
             "refusal": self.refusal,
             "saved_s": self.saved_s,
@@ -388,8 +390,10 @@ class Site:
                     job.lock.renew()
 
     def close(self):
-        """Release the locks at the end of the server."""
+        """Save jobs that are saved automatically, and release the locks, at the end of the server."""
         for job in self._jobs.values():
+            if job.is_unsaved and job.is_autosaved:
+                job.save()
             job.lock.release()
 
     def forget(self, key):

@@ -23,7 +23,7 @@ async function request(address, options = {}) {
   const answer = await fetch(address, { credentials: "same-origin", ...options });
   const kind = answer.headers.get("content-type") ?? "";
   const content = kind.includes("json") ? await answer.json() : await answer.text();
-  if (!answer.ok) throw Object.assign(new Error(content.error ?? texts.failed), { status: answer.status });
+  if (!answer.ok) throw Object.assign(new Error(content.error ?? texts.failed), { status: answer.status, isStranger: answer.status === 403 && !kind.includes("json") });
   return content;
 }
 
@@ -37,7 +37,8 @@ async function flush() {
   while (pending.length) {
     const { content, take } = pending[0];
     try {
-      const body = JSON.stringify({ ...content, client, since: shown.revision });
+      if (shown.desk === null) await renewEntries();
+      const body = JSON.stringify({ ...content, client, since: shown.revision, desk: shown.desk });
       const headers = { "content-type": "application/json" };
       const answer = await request(`${job.dataset.job}/act`, { method: "POST", headers, body });
       pending.shift();
@@ -45,18 +46,30 @@ async function flush() {
       takeState(answer);
       take?.(answer);
     } catch (error) {
-      if (error.status) {
+      if (error.status === 412) shown.desk = null;
+      else if (error.status && !error.isStranger) {
         pending.shift();
         tell(error.message);
         shown.revision = -1;
         await refresh();
       } else {
-        tell(texts.offline);
+        tell(error.isStranger ? texts.restarted : texts.offline);
         await new Promise((done) => setTimeout(done, 2000));
       }
     }
   }
   sending = false;
+}
+
+// After a restart of the server, entries apply if the rest of their table has not changed.
+async function renewEntries() {
+  const state = await request(`${job.dataset.job}/changes?since=-1&name=${encodeURIComponent(shown.name ?? "")}`);
+  const entered = new Set(pending.flatMap(({ content: { action } }) => action.changes ?? []).map(([row, column]) => `${row},${column}`));
+  const columns = model?.content.columns.map((item) => item.name);
+  const compared = (rows) => JSON.stringify(rows.map((cells, row) => cells.filter((_, place) => !entered.has(`${row},${columns[place]}`))));
+  const isSame = !model || (state.rows && compared(state.rows) === compared(model.content.rows));
+  for (const { content } of pending) content.revision = isSame ? state.revision : -1;
+  shown.desk = state.desk;
 }
 
 // Entries that are on their way arrive before the page is left.
@@ -73,7 +86,7 @@ window.addEventListener("beforeunload", (event) => { if (pending.length) event.p
 
 // ---- state of the job: saved, Undo, Redo, problems
 
-const shown = { revision: job ? Number(job.dataset.revision) : 0, name: null, take: null };
+const shown = { revision: job ? Number(job.dataset.revision) : 0, desk: job?.dataset.desk, name: null, take: null };
 
 function takeState(state) {
   shown.revision = state.revision;
@@ -97,18 +110,27 @@ async function refresh() {
   const name = shown.name ? `&name=${encodeURIComponent(shown.name)}` : "";
   try {
     const state = await request(`${job.dataset.job}/changes?since=${shown.revision}${name}`);
-    if (pending.length && !sending) return;
+    if (pending.length && (!sending || state.desk !== shown.desk)) return;
+    if (state.desk !== shown.desk) { Object.assign(shown, { desk: state.desk, revision: -1 }); await refresh(); return; }
     takeState(state);
     shown.take?.(state);
   } catch { /* the next event asks again */ }
 }
 
-function listenToJob() {
+function listenToEvents() {
   const events = new EventSource(`${job.dataset.job}/events`);
   events.onmessage = () => { if (!pending.length) refresh(); };
-  events.onerror = () => tell(texts.offline);
+  events.onerror = () => {
+    const isRefused = events.readyState === EventSource.CLOSED;
+    tell(isRefused ? texts.restarted : texts.offline);
+    if (isRefused) setTimeout(listenToEvents, 2000);
+  };
   events.onopen = () => { tell(""); refresh(); };
   window.addEventListener("pagehide", () => events.close());
+}
+
+function listenToJob() {
+  listenToEvents();
   for (const kind of ["undo", "redo", "save"]) {
     $(kind).addEventListener("click", () => act({ kind }));
   }
