@@ -241,7 +241,7 @@ def test_the_worst_delivery_of_each_minimum_height_is_reported(found, record):
     rows = table_of(found, "Stated volumes")
     assert len(rows) == len(record["budgets"])
     assert [row[-1] for row in rows[-2:]] == [
-        f"the largest U/V of all deliveries of {least}\xa0m or more"
+        f"the largest U/V of all deliveries of exactly {least}\xa0m"
         for least in ("0.5", "1")
     ]  # fmt: skip
     worst = table_of(found, "Worst deliveries")
