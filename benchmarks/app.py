@@ -24,6 +24,7 @@ TANKCAL = [sys.executable, "-m", "tankcal"]
 VISITORS = 20
 TICKS_PER_S = 100
 WITHIN_S = 120
+ADDED = ("sx_mm", "sy_mm", "sz_mm", "section", "generatrix")  # columns beside point, x, y and z
 MARGIN = 2  # of a budget, before it counts as exceeded
 
 
@@ -126,14 +127,18 @@ def measure_edits(folder, size, budget_s, keep):
         keep("app, edit to the mark at its cell (clock)", rows, first, 0.05)
         keep("app, edit to the check of all rows", rows, whole, budget_s)
         if size == 5000:
-            block = [[f"{i + j / 10:.3f}" for j in range(3)] for i in range(size)]
-            action = {"kind": "paste", "row": 0, "column": 1, "cells": block}
+            for name in ADDED:
+                action = {"kind": "column", "name": name}
+                answer = visitor.act(f"{job}act", {"name": "points", "action": action})
+            seen = wait_for_check(visitor, job, answer["revision"])["revision"]
+            block = [[f"P{i}", *(f"{i + j / 10:.3f}" for j in range(8))] for i in range(size)]
+            action = {"kind": "paste", "row": 0, "column": 0, "cells": block}
             used = processor_s(process)
             answer = visitor.act(f"{job}act", {"name": "points", "action": action, "since": seen,
-                                               "revision": state["revision"]})  # fmt: skip
+                                               "revision": seen})  # fmt: skip
             wait_for_check(visitor, job, answer["revision"])
             pasted = processor_s(process) - used
-            keep("app, paste to the check of all rows", f"{size} x 3 cells", [pasted], 1.0)
+            keep("app, paste to the check of all rows", f"{size} x 9 cells", [pasted], 1.0)
 
 
 def wait_for_check(visitor, job, since):
