@@ -159,6 +159,25 @@ def test_remarks_are_resolved_once(folder):
 
 
 @pytest.mark.slow
+def test_who_submitted_approves_only_with_a_reason(client, site, folder, monkeypatch):
+    # A record without numbers cannot be assessed.
+    monkeypatch.setattr("tankcal.products.app.review_pages._refuse_unexplained", lambda job: None)
+    key, sha = site.add(folder), write_record(folder)
+
+    def decide(decision, name, text=""):
+        return post(client, f"/job/{key}/review", act=decision, name=name, record=sha, text=text)
+
+    assert decide("submitted", "Ana  Lima").status_code == 303
+    answer = decide("approved", " Ana Lima ", " ")
+    assert answer.status_code == 409
+    assert "Ana Lima enviou estes resultados" in answer.text
+    assert review.find_decision(review.read_events(folder), sha).act is Act.SUBMITTED
+    assert decide("approved", "Ana Lima", "works alone").status_code == 303
+    assert decide("revised", "Rui", "again").status_code == 303
+    assert decide("submitted", "Ana Lima").status_code == 303
+    assert decide("approved", "Rui").status_code == 303
+
+
 def test_an_approved_job_is_read_only_until_it_is_revised(client, site, folder):
     key, sha = site.add(folder), write_record(folder)
     page = client.get(f"/job/{key}/review").text

@@ -74,7 +74,7 @@ def _describe_review(request, job, language):
         "changes": [(item, desk.reader.title(item.name)) for item in changes[:MOST_SHOWN]],
         "more": max(0, len(changes) - MOST_SHOWN),
         "name": person.name or desk.draft.value("certificate", "authorised_by"),
-        "submitters": sorted({event.name for event in events if event.act is Act.SUBMITTED}),
+        "submitters": review.list_submitters(events, sha256),
         "record_sha256": sha256,
         "places": [(name, desk.reader.title(name)) for name in ("job", *desk.names)],
         "lines": [], "verdict": "", "rejected": 0, "warnings": [], "met": 0, "checked": 0,
@@ -151,12 +151,14 @@ async def decide(request):
     if act is not Act.RESOLVED:
         # The decision belongs to the results that the person has read, and they to the files.
         _refuse_other_results(job, sha256)
+    name = person.name or form.get("name", "")
     if act is Act.APPROVED and not form.get("text", "").strip():
         _refuse_unexplained(job)
+        _refuse_same_person(job, sha256, name)
     place = ", ".join(filter(None, (form.get(key, "").strip() for key in ("table", "row"))))
     number = form.get("number", "")
     review.add_event(
-        draft, act, person.name or form.get("name", ""), sha256, form.get("text", ""), place,
+        draft, act, name, sha256, form.get("text", ""), place,
         int(number) if number.isdecimal() and len(number) <= MOST_DIGITS else 0,
     )  # fmt: skip
     job.follow_lock()
@@ -187,6 +189,19 @@ def _refuse_unexplained(job):
             "review_unexplained",
             "{count} nonconformities are open; expected the reason why the results are approved",
             count=count,
+        )
+        raise InputError(Problem("text", text))
+
+
+def _refuse_same_person(job, sha256, name):
+    """Raise InputError for an approval by the person who submitted, without a reason."""
+    name = " ".join(name.split())
+    if name in review.list_submitters(review.read_events(job.source), sha256):
+        text = message(
+            "review_same_person",
+            "{name} submitted these results; expected another person, or the reason for approving "
+            "them alone",
+            name=name,
         )
         raise InputError(Problem("text", text))
 

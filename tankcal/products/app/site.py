@@ -390,7 +390,7 @@ class Site:
                     job.lock.renew()
 
     def close(self):
-        """Save jobs that are saved automatically, and release the locks, at the end of the server."""
+        """Save jobs that are saved automatically, and release the locks, when the server ends."""
         for job in self._jobs.values():
             if job.is_unsaved and job.is_autosaved:
                 job.save()

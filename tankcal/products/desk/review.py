@@ -132,6 +132,15 @@ def find_decision(events, record_sha256):
     return last
 
 
+def list_submitters(events, record_sha256):
+    """Names of the persons who submitted a record."""
+    names = {
+        event.name for event in events
+        if event.act is Act.SUBMITTED and event.record_sha256 == record_sha256
+    }  # fmt: skip
+    return sorted(names)
+
+
 def list_remarks(events):
     """List of (remark, event that resolved it or None)."""
     resolved = {event.number: event for event in events if event.act is Act.RESOLVED}
