@@ -139,6 +139,11 @@ def whole(block):
     return Block({**block.data, "whole": True})
 
 
+def captioned(block):
+    """Return the table with its caption repeated at the top of each page it runs on over."""
+    return Block({**block.data, "captioned": True})
+
+
 def side_by_side(block):
     """Return the names and values, with their second half beside the first half in the PDF."""
     return Block({**block.data, "side-by-side": True})

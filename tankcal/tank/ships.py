@@ -330,7 +330,8 @@ def corrections_of(parts, even, soundings_m, top_m=np.inf):
     all_soundings = np.concatenate([soundings, midpoints])
     volumes = np.array([mesh.volume_m3(np.minimum(all_soundings, mesh.top_m)) for mesh in parts])
     is_full = all_soundings >= np.array([mesh.top_m for mesh in parts])[:, None]
-    is_below = ~is_full & (volumes < even.dry_m3)
+    # A first row at even keel equals the volume of the dry pipe up to rounding: it is in the table.
+    is_below = ~is_full & (volumes < even.dry_m3 - CLOSE * even.capacity_m3)
     even_m = np.full(volumes.shape, np.nan)
     # The volumes of all trims and lists are inverted at once.
     even_m[~is_full & ~is_below] = soundings_of_volumes(even, volumes[~is_full & ~is_below])

@@ -71,6 +71,18 @@ def test_the_csv_has_every_correction(record, tmp_path):
     assert {one["correction_mm"] for one in full} == {""}
 
 
+def test_even_keel_has_the_correction_zero_down_to_the_first_row(record):
+    """By definition; the volumes of the two meshes differ by rounding only."""
+    (level,) = [cell for cell in record["ship"]["cells"] if cell["trim_m"] == cell["list_deg"] == 0]
+    corrections = [
+        correction
+        for correction, state in zip(level["correction_m"], level["state"], strict=True)
+        if state != "full"
+    ]
+    assert corrections == pytest.approx([0.0] * len(corrections), abs=1e-9)
+    assert level["full_m"] - record["ship"]["sounding_m"][len(corrections) - 1] < 0.25
+
+
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_papers_in_every_language(record, language):
     """A matrix for each list, seven trims wide, and the states in words."""
@@ -80,6 +92,7 @@ def test_papers_in_every_language(record, language):
     paper.record = translate_record(words, record)
     matrices = [one.data for one in ship.corrections(paper)]
     assert len(matrices) == 5
+    assert all(one["captioned"] for one in matrices)
     assert all(len(one["columns"]) == 9 for one in matrices)
     assert {len(one["rows"]) for one in matrices} == {len(record["ship"]["sounding_m"])}
     assert any(words["ship_states"]["full"] in row for row in matrices[0]["rows"])
