@@ -181,8 +181,11 @@ def _covariance_choice(job):
 
 
 def _thickness_choice(job, result):
+    if job.mesh is not None:
+        return "surface"
     if job.survey.side == "inside":
-        return "inside"
+        is_surveyed = any(not method.is_supplement for method in given_methods(job))
+        return "inside" if is_surveyed or job.tank.kind == "vertical" else "dimensions"
     solid = job.horizontal or job.sphere
     parts = job.courses or job.rings
     has_thickness = any(c.thickness_m + c.paint_m for c in parts) or (solid and solid.thickness_m)

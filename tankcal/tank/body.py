@@ -53,6 +53,8 @@ class ShellPart(Part):
         Names of inputs that do not apply to the survey.
     subtracts : bool
         Whether plate and paint were subtracted from the surveyed radii.
+    tilt_known : bool
+        Whether the survey determines the tilt; otherwise `tilt` is 0.
     """
 
     volume: ShellVolume
@@ -65,6 +67,7 @@ class ShellPart(Part):
     read_with: dict = field(default_factory=dict)
     unused: tuple[str, ...] = ()
     subtracts: bool = True
+    tilt_known: bool = True
 
     @property
     def breakpoints_m(self):
@@ -359,21 +362,27 @@ class Body:
         """Return the names of the inputs that change a volume but have no declared u.
 
         The estimated scale of an instrument replaces the scale of the survey. The common error of
-        the heights of a bottom replaces its height.
+        the heights of a bottom replaces its height. The declared dimensions of a solid without a
+        survey replace the scale. An unknown tilt is named, although its derivative at 0 is 0.
         """
         levels = np.linspace(self.lowest_m, self.highest_m, LEVELS)
         derivatives = self.derivatives(levels)
         known_names = {item.name for item in self.declared}
+        is_tilt_known = self.shell is None or self.shell.tilt_known
         if self.shell is not None:
             known_names.update(self.shell.unused)
-        if any(item.kind == OWN_SCALE for part in self.parts for item in part.sources(levels)):
+        sources = [item for part in self.parts for item in part.sources(levels)]
+        if any(item.kind == OWN_SCALE for item in sources):
+            known_names.add("scale")
+        if self.shell is None and "diameter" in derivatives and not sources:
             known_names.add("scale")
         if any(part.has_own_height for part in self.parts):
             known_names.add("bottom")
         return tuple(
             name
             for name, derivative in derivatives.items()
-            if name not in known_names and _changes_volume(derivative)
+            if name not in known_names
+            and (_changes_volume(derivative) or (name == "tilt" and not is_tilt_known))
         )
 
     def sources(self, levels_m):

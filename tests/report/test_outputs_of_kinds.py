@@ -12,6 +12,7 @@ from job_builder import write_job
 
 import tankcal
 from tankcal.report import outputs
+from tankcal.report.certificate import calibration
 from tankcal.report.paper import Paper
 from tankcal.report.uncertainty.capacity import NOT_FOR_USE, density_blocks
 from tankcal.report.workbook.look import CRITICAL
@@ -151,6 +152,16 @@ def test_tank_without_courses_has_no_course_outputs(lying):
     assert not (folder / "points.csv").exists()
     book = openpyxl.load_workbook(folder / "capacity.xlsx")
     assert not {"Courses and sections", "Points and residuals"} & set(book.sheetnames)
+
+
+def test_declared_dimensions_are_no_survey(lying):
+    result, folder = lying
+    paper = Paper(record_in(folder))
+    assert "scale" not in result.body.undeclared()  # the diameter is declared
+    sentences = " ".join(paper.choices())
+    assert "dimensions are inside dimensions" in sentences
+    assert "survey was made from inside" not in sentences
+    assert "Surveyed from" not in dict(calibration(paper).data["items"])
 
 
 def test_table_in_feet_and_barrels_also_has_metres(lying):

@@ -24,6 +24,7 @@ from tankcal.record.covariance_factor import blocks_of
 from tankcal.record.schema import to_plain
 from tankcal.record.table import budgets_of
 from tankcal.report import figures
+from tankcal.report.numbers import degrees_of_freedom
 from tankcal.report.paper import Paper
 from tankcal.report.pdf import pdf
 from tankcal.report.plots import style as plot_style
@@ -32,7 +33,7 @@ from tankcal.report.uncertainty import figures as drawn
 from tankcal.report.uncertainty.stated import stated_rows, uneven_rows
 from tankcal.tank.rules.model import DEVIATION_OF, GUARDS, RELATIVE_TO, SIDES, TANKS, UNCERTAINTY_OF
 from tankcal.tank.rules.verdict import DeviationVerdict, RuleVerdict, UncertaintyVerdict
-from tankcal.text.digits import decimals_of, decimals_of_rows, fixed
+from tankcal.text.digits import NOTHING, decimals_of, decimals_of_rows, fixed
 from tankcal.text.words import input_name, load_words
 
 SLOW_FIXTURES = {"result", "path"}  # seconds each
@@ -228,6 +229,10 @@ def test_delivery_has_monte_carlo_interval_if_gum_fails(result, record):
     assert rows[1.0]["low_m3"] == one["low_m3"]  # uneven: its ends are told
     assert one["low_m3"] == pytest.approx(volume - down, rel=1e-12)
     assert (rows[1.4]["U_m3"], rows[1.4]["k"]) == (two["U_m3"], two["k"])
+    (column,) = method.stated_table(other).only("dof").columns
+    of_gum, of_monte_carlo = Paper(other).column_texts([rows[1.4], rows[1.0]], column)
+    assert of_monte_carlo == NOTHING  # degrees of freedom belong to a k
+    assert of_gum == degrees_of_freedom(two["dof"])
     remarks = method.remarks(Paper(other), rows[1.0])
     assert remarks == [
         f"from {one['volume_m3'] - down:.2f}\xa0m³ to {one['volume_m3'] + up:.2f}\xa0m³",

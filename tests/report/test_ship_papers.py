@@ -12,7 +12,9 @@ import tankcal
 from tankcal import record as records
 from tankcal.record import record_of
 from tankcal.report import ship
+from tankcal.report.certificate import calibration
 from tankcal.report.outputs.csv_files import write_tables
+from tankcal.report.paper import Paper
 from tankcal.report.plain import PlainPaper
 from tankcal.report.tables import ship as tables
 from tankcal.text.shipped import LANGUAGES
@@ -69,6 +71,12 @@ def test_the_csv_has_every_correction(record, tmp_path):
     full = [one for one in rows if one["state"] == "full"]
     assert full
     assert {one["correction_mm"] for one in full} == {""}
+
+
+def test_a_mesh_is_no_survey(record):
+    paper = Paper(record)
+    assert "mesh is the inside surface" in " ".join(paper.choices())
+    assert "Surveyed from" not in dict(calibration(paper).data["items"])
 
 
 def test_even_keel_has_the_correction_zero_down_to_the_first_row(record):

@@ -112,9 +112,19 @@ def test_what_was_assumed_is_said(strapped):
     assert "measured by tape" in said
     assert "deviations of 5 mm" in said
     assert "cylinder with the mean radius" in said
-    assert "offset" not in next(
+    missing = next(
         one["value"] for one in paper.record["choices"] if one["code"] == "not_in_budget"
     )
+    assert "offset" not in missing
+    assert "tilt" in missing  # not measured, and no standard uncertainty was declared
+
+
+@pytest.mark.slow(after=1)
+def test_a_declared_tilt_is_not_missing(tmp_path):
+    parts = strapped_parts()
+    parts.tables["uncertainty"] = [["input", "u", "unit", "type"], ["tilt", 2.0, "mm/m", "B"]]
+    result = tankcal.run(tankcal.load(write_folder(tmp_path, parts)), simulated=False)
+    assert "tilt" not in result.body.undeclared()
 
 
 @pytest.mark.parametrize("language", ["en", "pt-BR", "es"])

@@ -187,7 +187,7 @@ def useless_inputs(values, tables):
         "expected only with a survey: the radii are those of the empty shell, inside, with their"
         " own uncertainty",
     )
-    inputs = ("scale", "offset", "tilt", "paint", "shell_temperature", "survey_level")
+    inputs = ("scale", "offset", "paint", "shell_temperature", "survey_level")
     reasons = of_temperature(values, values["radii"]["reference_temperature_c"])
     return reasons | dict.fromkeys((*inputs, "survey_density"), why)
 

@@ -55,7 +55,7 @@ class RadiiWall:
     updated: "Updated | None" = None
     surveyed_as = "radii"
     shell = UprightAxis()
-    without_inputs = ("offset", "scale", "tilt")  # of surveyed lengths
+    without_inputs = ("offset", "scale")  # of surveyed lengths
     has_applied_inputs = True
     straps = None
 

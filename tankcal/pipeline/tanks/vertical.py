@@ -354,6 +354,7 @@ def _shell(job, wall, switches, uncertain):
         read_with,
         wall.without_inputs,
         job.survey.side == "outside",
+        wall.shell.tilt_known,
     )
 
 

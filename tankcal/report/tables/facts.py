@@ -12,6 +12,7 @@ from tankcal.text.words import method_line
 
 CERTIFICATE, FIELD_TABLE = "certificate", "field_table"
 BOTH = f"{CERTIFICATE} {FIELD_TABLE}"
+NOT_SURVEYED = {"drawing", "surface", "dimensions"}  # choices on the thickness without a survey
 
 
 def _day(paper, row):
@@ -108,12 +109,14 @@ def _survey(record):
     radii = record.get("radii")
     dates = {key: record["job"]["certificate"].get(key) for key in ("survey_end",)}
     dates["survey_date"] = survey["date"]
+    thickness = {row["value"] for row in record["choices"] if row["code"] == "thickness"}
     if radii and not radii["change"]:  # no survey: the date is the date of the radii
         return [dates]
     return [
         {
             **dates,
-            "survey_side": survey["side"],
+            # Drawings and declared dimensions are no survey.
+            "survey_side": None if thickness & NOT_SURVEYED else survey["side"],
             "shell_temperature": survey["shell_temperature_c"],
             "liquid_level": survey["liquid_level_m"],
             "liquid_density": survey["liquid_density_kg_m3"],

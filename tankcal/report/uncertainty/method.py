@@ -236,7 +236,8 @@ def stated_blocks(paper):
 
 
 def _dof(paper, row):
-    return numbers.degrees_of_freedom(row["dof"], paper.marks)
+    # As k, the degrees of freedom belong to an interval of the law of propagation.
+    return None if row["simulated"] else numbers.degrees_of_freedom(row["dof"], paper.marks)
 
 
 def _interval(paper, row):
