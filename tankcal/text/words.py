@@ -262,7 +262,10 @@ def input_name(words, row):
     is_share = row["input"] == "deadwood" and row["unit"] == "%"
     name = name_of_input(words, "deadwood_share" if is_share else row["input"])
     if row["input"] in NAMED_INPUTS and row["note"] and not is_share:
-        name = f"{name}: {row['note']}"
+        note = row["note"]
+        if row["input"] == "plate_readings":  # its note is the name of a course
+            note = words["texts"]["named_course"].format(course=note)
+        name = f"{name}: {note}"
     return words["texts"]["default_input"].format(input=name) if row.get("is_default") else name
 
 

@@ -114,7 +114,7 @@ def test_a_meter_that_nothing_checks_is_told(tmp_path, proved):
     assert controls["meter"]["of"] == "M"
     assert controls["meter"]["undetected_U"] > 2
     page_1 = [block.data for block in certificate.doubtful_input(Paper(record))]
-    assert page_1[0] == {"kind": "notice", "text": "NOT CHECKED"}
+    assert page_1[0] == {"kind": "notice", "text": "LIMITS OF THE CHECKS"}
     lines = page_1[1]["items"]
     assert any("factor of meter M" in one for one in lines) is not proved
     assert any("leak below" in one for one in lines)  # no dip was read at rest

@@ -52,7 +52,7 @@ def test_an_effect_that_is_not_corrected_has_its_sign(size, shown):
     sound = certificate.limits_of_u(Paper(record, language="en"))
     assert "not corrected" not in sound
     off = certificate.limits_of_u(Paper(with_correction_off(record, "head", size), language="en"))
-    assert f"Liquid head, {shown}\N{NO-BREAK SPACE}m³" in off
+    assert f"Internal pressure (gas, liquid), {shown}\N{NO-BREAK SPACE}m³" in off
 
 
 @pytest.mark.parametrize("name", ["france_2003", "france_2003_outside", "france_2003_alcohol"])
@@ -112,4 +112,4 @@ def test_first_and_last_day_digits_and_software_are_stated():
     shown_blocks = certificate_blocks("strapping", "en")
     (code,) = (block for block in shown_blocks if block["kind"] == "hash_code")
     assert f"tankcal {record['tankcal']}" in code["text"]
-    (_,) = (text for text in texts(shown_blocks) if "more digits than U" in text)
+    (_,) = (text for text in texts(shown_blocks) if "more decimals than U" in text)

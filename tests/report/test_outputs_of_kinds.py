@@ -130,7 +130,7 @@ def test_csv_table_has_other_densities_and_not_for_use(furnished):
 
 def test_the_certificate_prints_every_part(furnished):
     text = text_of(furnished[1] / "certificate.pdf")
-    parts = ("coil #1", "Floating roof", "cone", "not for use", "1000 kg/m³", "Liquid head")
+    parts = ("coil #1", "Floating roof", "cone", "not for use", "1000 kg/m³", "Internal pressure")
     for words in (*parts, "1.15 × 10⁻⁵"):
         assert words in text
 

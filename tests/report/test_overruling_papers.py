@@ -135,7 +135,7 @@ def test_all_papers(folder, result, tmp_path):
     assert any(one.startswith("dent: kept, regardless of the search") for one in cells)
     html = (out / "report.html").read_text(encoding="utf-8")
     assert "<b>&quot;seen" not in html
-    assert "Decisions that override the search for blunders" in html
+    assert "Decisions that override the search for gross errors" in html
 
 
 def test_the_digital_certificate_states_each(record):

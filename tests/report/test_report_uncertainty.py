@@ -268,16 +268,16 @@ def test_inputs_are_separated(of_example, example):
     by_default = said["Inputs with a default u (not declared)"]
     assert by_default.startswith("Coefficient of thermal expansion: u\xa0=\xa05.8")
     assert by_default.endswith("rectangular")
-    assert "(default)" in said["Inputs from reading the table"]
+    assert "(default)" in said["Inputs from reading the table (only in stated volumes and deliveries)"]
     declared = [line["input"] for line in lines if line["u"] is not None and not line["is_default"]]
     assert said["Inputs declared"].count("u\xa0=\xa0") == len(declared)
-    told = said["NOT included in U (not declared)"]
+    told = said["NOT included in U (u not declared)"]
     assert told == words["texts"]["nothing_missing"]  # the example declares everything
 
 
 def test_undeclared_inputs_are_named(found, record):
     (missing,) = (one["value"] for one in record["choices"] if one["code"] == "not_in_budget")
-    names = facts(found)["NOT included in U (not declared)"].split("; ")
+    names = facts(found)["NOT included in U (u not declared)"].split("; ")
     assert names == [load_words()["inputs"][name] for name in missing]
     assert names
 

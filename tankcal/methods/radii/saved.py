@@ -90,18 +90,20 @@ def _survey_values(updated, course, is_known):
 def choices_of(result):
     """Choices on former radii of the courses, and on their origin: {code: value}."""
     job = result.job
+    is_updated = result.radii.updated is not None
     temperature = "radii_applied" if job.switches.temperature else "off"
     if job.radii.temperature_c == job.table.reference_temperature_c:
-        temperature = "radii_as_they_are"
+        is_reduced = is_updated and job.survey.shell_temperature_c is not None
+        temperature = "radii_updated" if is_reduced else "radii_as_they_are"
     return {
         "bottom": bottom_choice(job),
         **top_choice(job),
         "radii": job.radii.source,
-        "radii_beside": "none" if result.radii.updated is None else "survey",
+        "radii_beside": "survey" if is_updated else "none",
         "between_sections": "radii",
         "tilt": "not_known",
         "course_heights": "along_axis",
         "roof": roof_choice(job),
-        "thickness": "radii",
+        "thickness": "radii_updated" if is_updated else "radii",
         "temperature": temperature,
     }

@@ -182,7 +182,7 @@ def choices_of(result):
         return {}
     return {
         "bottom": bottom_choice(job),
-        "survey": "strapping",
+        "survey": "strapping" if job.radii is None else "strapping_again",
         "area_term": _area_term_choice(job.strapping.shape_sd_m),
         **top_choice(job),
         "between_sections": "cylinders",

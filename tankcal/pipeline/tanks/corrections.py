@@ -165,14 +165,22 @@ def _shell_corrections(job, wall):
     """Corrections of a vertical shell: tilt, liquid head, bottom, top and roof."""
     survey, table, roof = job.survey, job.table, job.roof
     head = message(
-        "liquid_head",
-        "Δr = ρ g (h − z) r²/(E t), g = {g_m_s2:g} m/s²; table {table_kg_m3:g} kg/m³, survey"
-        " {survey_kg_m3:g} kg/m³ to {level_m:g} m",
+        "liquid_head_empty",
+        "Δr = ρ g (h − z) r²/(E t), g = {g_m_s2:g} m/s²; table {table_kg_m3:g} kg/m³; survey: empty"
+        " tank",
         g_m_s2=STANDARD_GRAVITY,
         table_kg_m3=table.liquid_density_kg_m3,
-        survey_kg_m3=survey.liquid_density_kg_m3 or 0,
-        level_m=survey.liquid_level_m or 0,
     )
+    if survey.liquid_density_kg_m3 and survey.liquid_level_m:
+        head = message(
+            "liquid_head",
+            "Δr = ρ g (h − z) r²/(E t), g = {g_m_s2:g} m/s²; table {table_kg_m3:g} kg/m³, survey"
+            " {survey_kg_m3:g} kg/m³ to {level_m:g} m",
+            g_m_s2=STANDARD_GRAVITY,
+            table_kg_m3=table.liquid_density_kg_m3,
+            survey_kg_m3=survey.liquid_density_kg_m3,
+            level_m=survey.liquid_level_m,
+        )
     return (
         (
             "tilt",
@@ -211,6 +219,15 @@ def _pressure_correction(job):
         survey_kg_m3=load.survey_density_kg_m3,
         level_m=load.survey_level_m,
     )
+    if not (load.survey_density_kg_m3 and load.survey_level_m):
+        formula = message(
+            "pressure_of_sphere_empty",
+            "Δr = p r² (1 − ν)/(2 E t), p = p₀ + ρ g h²/(4 r); table {table_bar:g} bar and"
+            " {table_kg_m3:g} kg/m³; survey: {survey_bar:g} bar, no liquid",
+            table_bar=load.gas_pa / 1e5,
+            table_kg_m3=load.density_kg_m3,
+            survey_bar=load.survey_gas_pa / 1e5,
+        )
     return ("head", load.is_there, formula, THIN_SHELL)
 
 

@@ -222,8 +222,7 @@ def _format_u(paper, u, unit):
     """Format an uncertainty with two digits and its unit; volumes have the unit of the paper."""
     if unit == "m3":
         return paper.number(u, unit, digits=2)
-    text, shown = paper.number(u, digits=2), numbers.symbol(unit)
-    return f"{text}\N{NO-BREAK SPACE}{shown}" if shown else text
+    return numbers.join_unit(paper.number(u, digits=2), numbers.symbol(unit))
 
 
 def stated_blocks(paper):
