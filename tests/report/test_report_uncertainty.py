@@ -268,7 +268,8 @@ def test_inputs_are_separated(of_example, example):
     by_default = said["Inputs with a default u (not declared)"]
     assert by_default.startswith("Coefficient of thermal expansion: u\xa0=\xa05.8")
     assert by_default.endswith("rectangular")
-    assert "(default)" in said["Inputs from reading the table (only in stated volumes and deliveries)"]
+    of_reading = "Inputs from reading the table (only in stated volumes and deliveries)"
+    assert "(default)" in said[of_reading]
     declared = [line["input"] for line in lines if line["u"] is not None and not line["is_default"]]
     assert said["Inputs declared"].count("u\xa0=\xa0") == len(declared)
     told = said["NOT included in U (u not declared)"]
