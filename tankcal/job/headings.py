@@ -19,7 +19,7 @@ USUAL = {  # usual headings, by the name of the column without its unit
         *("point", "point name", "point id", "point number", "name", "id", "no", "number", "pt"),
         *("ponto", "nome", "nome do ponto", "numero", "punto", "nombre", "nombre del punto", "pto"),
         *("no do ponto", "n° do ponto", "numero do ponto", "no de punto", "n° de punto", "n°"),
-        *("numero de punto", "numero del punto", "vertex", "vertice"),
+        *("numero de punto", "numero del punto", "vertex", "vertice", "n o", "pt id", "pt no"),
     ),
     "x": (
         *("x", "coord x", "coordenada x", "coordinate x", "e", "east", "easting", "este", "leste"),

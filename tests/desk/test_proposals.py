@@ -62,6 +62,24 @@ def test_units_are_converted_exactly():
     assert chosen.convert()[1] == [("A", "14932.5", "0.254", "0.0125")]
 
 
+@pytest.mark.parametrize(
+    ("heading", "numbers", "decimal", "converted"),
+    [
+        ("Pt ID", ("1,098.425", "-12,345.5", "7.546"), ".", ("1098.425", "-12345.5", "7.546")),
+        ("N.º", ("1.098,425", "1.234.567,5", "7,546"), ",", ("1098.425", "1234567.5", "7.546")),
+        ("pt no", ("1 098,425", "1'098.425", "7,546"), "", None),  # two decimal marks
+        ("Nº", ("1.098.425", "1,098.425", "1.23"), ".", ("1.098.425", "1098.425", "1.23")),
+    ],
+)
+def test_thousands_with_a_decimal_mark_have_one_meaning(heading, numbers, decimal, converted):
+    rows = ";".join((heading, "E", "N", "Z")), ";".join(("A", *numbers))
+    proposal = propose("\r\n".join(rows).encode("utf-8-sig"))
+    assert proposal.columns[0].target == "point"
+    assert proposal.decimal == decimal
+    if converted:
+        assert proposal.convert()[1] == [("A", *converted)]
+
+
 def test_the_user_assigns_columns():
     data = b"a,b,c,d\nP1,1.5,2.5,3.5\n"
     assert propose(data).missing == ["point", "x_m", "y_m", "z_m"]

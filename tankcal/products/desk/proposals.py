@@ -30,6 +30,8 @@ TESTED_LINES = 200  # lines from which separator and width are determined
 MOST_ROWS = 100_000
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
 _MARKED = re.compile(r"[+-]?\d*([.,])\d+([eE][+-]?\d+)?")
+# A number with separated thousands and a different decimal mark has one meaning.
+_GROUPED = re.compile(r"[+-]?\d{1,3}(?:(?P<group>[.,' \u00a0\u202f])\d{3})+(?!(?P=group))([.,])\d+")
 
 
 class Kind(StrEnum):
@@ -117,6 +119,9 @@ class Proposal:
                     unit, factor = split_unit(column.target)[1], Fraction(1)
                     if column.unit in LENGTHS and unit in LENGTHS:
                         factor = LENGTHS[column.unit] / LENGTHS[unit]
+                    grouped = _GROUPED.fullmatch(text)
+                    if grouped and grouped[2] == self.decimal:
+                        text = text.replace(grouped["group"], "")
                     text = convert_cell(text, factor, self.decimal)
                 cells.append(text)
             rows.append(tuple(cells))
@@ -243,8 +248,10 @@ def _recognise_decimal(rows, separator):
     marks, doubtful = set(), set()
     for row in rows:
         for cell in row:
-            marked = _MARKED.fullmatch(cell)
-            if marked:
+            marked, grouped = _MARKED.fullmatch(cell), _GROUPED.fullmatch(cell)
+            if grouped:
+                marks.add(grouped[2])
+            elif marked:
                 (doubtful if has_two_meanings(cell) else marks).add(marked[1])
     if separator == ",":
         return "."
