@@ -161,8 +161,15 @@ class Grid {
     for (let row = first; row < last; row++) drawn.push(this.line(row));
     if (last < this.rows.length) drawn.push(this.spacer(this.rows.length - last));
     const typed = this.input;
+    const selection = typed?.matches(":focus") ? [typed.selectionStart, typed.selectionEnd] : null;
+    this.input = null;  // its removal does not end the typing
     this.body.replaceChildren(...drawn);
+    this.input = typed;
     if (typed) this.placeInput(typed);
+    if (selection) {  // the next keys belong to the cell
+      typed.focus({ preventScroll: true });
+      typed.setSelectionRange(...selection);
+    }
     this.pane.setAttribute("aria-activedescendant", this.cellId(...this.active));
   }
 
