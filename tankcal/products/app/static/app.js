@@ -197,6 +197,13 @@ class Model {
     const marks = state.marks ?? this.mend(state.entered);
     if (state.rows) {
       Object.assign(this.content, state);
+      const columns = state.columns.map((item) => item.name);
+      // Entries that are on their way remain visible.
+      for (const { content: { action } } of pending) {
+        for (const [row, column, text] of action.changes ?? []) {
+          if (state.rows[row]) state.rows[row][columns.indexOf(column)] = text;
+        }
+      }
       this.tell("change:rows");
     } else if (state.cells) {
       for (const [row, column, text] of state.cells) {
