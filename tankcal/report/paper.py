@@ -18,6 +18,7 @@ from tankcal.report import attachments, blocks
 from tankcal.report.letterhead import read_saved
 from tankcal.report.plain import Column, PlainPaper
 from tankcal.report.scope import letterhead_in_scope
+from tankcal.report.uncertainty.stated import stated_U_m3
 from tankcal.text.words import (
     choice_sentence,
     input_name,
@@ -199,4 +200,6 @@ class Paper(PlainPaper):
         value, unit = size["value"], size["unit"]
         if unit is None:
             return self.words["parts"].get(value, str(value))
+        if size["code"] == "full_capacity" and (U_m3 := stated_U_m3(self.record["capacity"])[-1]):
+            return self.number(value, unit, u=U_m3)
         return self.number(value, unit, decimals=DECIMALS_OF_PARTS.get(unit, 0))

@@ -247,6 +247,19 @@ def test_intervals_are_never_negative_nor_wide_when_exact():
     assert exact.low_m3 == exact.high_m3 == 3.0
 
 
+def test_a_validated_interval_does_not_reach_below_an_empty_tank():
+    """V +- U with U = 0.3 at V = 0.1: one-sided, without k; without a bound it stays V +- U."""
+    volume, u = np.array([0.1]), np.array([0.15])
+    valid = judged(-0.2, 0.4, validated=np.array([True]))
+    found = judged_intervals(valid, volume, u, 2 * u, least_m3=0.0)
+    assert (found.low_m3[0], found.high_m3[0], found.by_gum[0]) == (0.0, 0.4, False)
+    assert found.U_m3[0] == pytest.approx(0.3)
+    assert judged_intervals(valid, volume, u, 2 * u).by_gum[0]
+    empty, none = np.zeros(1), np.zeros(1)
+    exact = judged_intervals(judged(0.0, 0.0, np.array([True])), empty, none, none, least_m3=0.0)
+    assert exact.by_gum[0]
+
+
 def test_a_row_that_is_not_in_its_interval_is_never_written(tmp_path):
     """What the simulation says of a row is refused as a whole, not printed."""
     parts = KINDS["sphere"] | {"uncertainty": DATUM}

@@ -565,8 +565,10 @@ def test_an_earlier_record_is_printed_with_what_it_has(tmp_path):
     U = old["capacity"]["U_m3"]
     (table,) = (b for b in found if b.get("caption", "").startswith("Capacity at each height"))
     assert [row[2] for row in table["rows"]] == [
-        fixed(one, digits) for one, digits in zip(U, decimals_of_rows(U), strict=True)
+        fixed(one, digits) if one else NOTHING
+        for one, digits in zip(U, decimals_of_rows(U), strict=True)
     ]
+    assert U[0] == 0.0  # the row of the empty tank
     assert [column["heading"] for column in table["columns"]] == ["Height", "Volume", "U", "k"]
     said = [text for text in texts(found) if "Monte Carlo" in text]
     assert said == ["No Monte Carlo simulation was made."]

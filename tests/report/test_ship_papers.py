@@ -17,6 +17,7 @@ from tankcal.report.outputs.csv_files import write_tables
 from tankcal.report.paper import Paper
 from tankcal.report.plain import PlainPaper
 from tankcal.report.tables import ship as tables
+from tankcal.report.uncertainty.stated import stated_U_m3
 from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import load_words, translate_record
 
@@ -75,6 +76,11 @@ def test_the_csv_has_every_correction(record, tmp_path):
 
 def test_a_mesh_is_no_survey(record):
     paper = Paper(record)
+    full = dict(paper.dimensions(record["solid"]).data["items"])[paper.label("full_capacity")]
+    stated = paper.number(
+        record["capacity"]["volume_m3"][-1], "m3", u=stated_U_m3(record["capacity"])[-1]
+    )
+    assert full == stated  # the digits of the headline
     assert "mesh is the inside surface" in " ".join(paper.choices())
     assert "Surveyed from" not in dict(calibration(paper).data["items"])
 

@@ -333,9 +333,10 @@ def gum_intervals(volume_m3, u_m3, U_m3):
 def judged_intervals(judged, volume_m3, u_m3, U_m3, least_m3=-np.inf):
     """`Intervals` of simulated volumes: V +- U if validated, otherwise the Monte Carlo interval.
 
-    A strong curvature moves the distribution away from the volume at the estimates. If the Monte
-    Carlo interval excludes that volume, the interval is extended to it. The stated value is then
-    inside, and a longer interval does not reduce the coverage.
+    V +- U is also replaced if it reaches below `least_m3`. A strong curvature moves the
+    distribution away from the volume at the estimates. If the Monte Carlo interval excludes that
+    volume, the interval is extended to it. The stated value is then inside, and a longer interval
+    does not reduce the coverage.
 
     Parameters
     ----------
@@ -355,7 +356,10 @@ def judged_intervals(judged, volume_m3, u_m3, U_m3, least_m3=-np.inf):
     ProgramError
         For an inconsistent interval.
     """
-    by_gum = judged.validated
+    # An interval of the law of propagation must not reach below the least volume: of a validated
+    # row, the simulation confirms the upper end.
+    rounding_m3 = ROUNDING * np.max(np.abs(volume_m3), initial=0.0)
+    by_gum = judged.validated & (judged.low >= least_m3 - rounding_m3)
     low = np.where(by_gum, judged.low, np.maximum(judged.low, least_m3))
     intervals = Intervals(low, judged.high, by_gum, judged.stated(volume_m3, U_m3))
     _refuse_without_width(intervals, volume_m3, u_m3)  # check before an end is moved

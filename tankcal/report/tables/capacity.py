@@ -14,7 +14,7 @@ NOT_FOR_USE = "†"  # mark of rows that must not be used
 def capacity_columns(record):
     """Return the columns of the table, {key: values}: volumes in m3 with the stated U.
 
-    U_m3 contains None if no input is uncertain. by_monte_carlo is present if only some of the
+    U_m3 contains None for rows without uncertainty. by_monte_carlo is present if only some of the
     intervals are results of Monte Carlo. dip, in_unit and U_in_unit are present if the table is in
     feet and inches, litres or barrels.
     """
@@ -23,7 +23,7 @@ def capacity_columns(record):
     columns = {key: capacity[key] for key in ("height_m", "volume_m3", "u_m3", "area_m2")}
     columns |= {
         "stated_U_m3": U_m3,
-        "U_m3": U_m3 if any(U_m3) else [None] * len(U_m3),
+        "U_m3": [U or None for U in U_m3],
         "k": k_of_rows(capacity),
     }
     if "interval" in capacity:  # absent in records of earlier versions
