@@ -120,7 +120,7 @@ def _choose_formula(of_delivery, of_volume):
 
     Down to the empty tank, errors of two dips cancel in part only (docs/studies/propagation.md).
     """
-    larger = f"{_find_at_high('U')}>=[delivery_k]*[delivery_u]"
+    larger = f"{_find_at_high('U')}>=[delivery_k]*[delivery_u]*(1-1E-9)"  # equal to rounding
     is_whole = f"AND([low_dip_volume]=0,{larger})"
     return if_number("[delivery_k]", f"IF({is_whole},{of_volume},{of_delivery})")
 
@@ -136,7 +136,7 @@ def results(table, words):
         simulated = quoted(words["intervals"]["monte_carlo"])
         k_of_volume = f'IF({_find_at_high("interval")}="{simulated}",{_NONE},{k_of_volume})'
     is_empty = table.volume_m3[table.low] == 0
-    if u != NOTHING and is_empty and table.U_m3[table.at] >= U:
+    if u != NOTHING and is_empty and table.U_m3[table.at] >= U * (1 - 1e-9):
         U, u, dof = table.U_m3[table.at], table.capacity["u_m3"][table.at], NOTHING
         k = NOTHING if table.k[table.at] is None else table.k[table.at]
     delivered = "[high_dip_volume]-[low_dip_volume]"
