@@ -139,7 +139,7 @@ def whole(block):
     return Block({**block.data, "whole": True})
 
 
-def captioned(block):
+def repeat_caption(block):
     """Return the table with its caption repeated at the top of each page it runs on over."""
     return Block({**block.data, "captioned": True})
 

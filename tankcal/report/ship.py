@@ -72,7 +72,7 @@ def _matrix(paper, list_deg, cells):
     rows = [list(row) for row in zip(*columns, strict=True)]
     caption = paper.word("captions.ship_matrix", list=paper.number(list_deg, "deg", decimals=2))
     align = ["decimal"] * len(heads)
-    return blocks.captioned(blocks.table(heads, rows, caption, align, paper.marks.decimal))
+    return blocks.repeat_caption(blocks.table(heads, rows, caption, align, paper.marks.decimal))
 
 
 def _correction(paper, cell, place):

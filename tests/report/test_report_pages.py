@@ -59,7 +59,7 @@ def test_a_long_table_has_no_lone_rows(printed, above):
 @pytest.mark.slow(after=1)
 def test_each_page_of_a_captioned_table_has_its_caption(printed):
     table = blocks.table(["a"], [[f"row {n}"] for n in range(150)], "a list of 2 degrees")
-    pages = printed(blocks.captioned(table))
+    pages = printed(blocks.repeat_caption(table))
     assert len(pages) > 2
     assert all(page.count("a list of 2 degrees") == 1 for page in pages)
     assert "a list of 2 degrees" not in printed(table)[1]

@@ -177,12 +177,14 @@ def choices_of(result):
     """Choices on straps, alone or beside points: {code: value}; {} for rings."""
     job = result.job
     if result.wall is not None:
-        return {"straps": "beside_points"}
+        is_inside = job.survey.side == "inside"
+        return {"straps": "beside_points"} | ({"thickness": "inside_strapped"} if is_inside else {})
     if result.strapped is None:
         return {}
+    is_partial = job.radii is not None  # the other courses keep their former radii
     return {
         "bottom": bottom_choice(job),
-        "survey": "strapping" if job.radii is None else "strapping_again",
+        "survey": "strapping_again" if is_partial else "strapping",
         "area_term": _area_term_choice(job.strapping.shape_sd_m),
         **top_choice(job),
         "between_sections": "cylinders",
