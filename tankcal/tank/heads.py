@@ -17,6 +17,7 @@ low) sin^2 v removes. Sources: Jones 2001, Computing fluid tank volumes; Davis &
 """
 
 from dataclasses import dataclass, field, replace
+from operator import methodcaller
 from types import MappingProxyType
 
 import numpy as np
@@ -389,6 +390,11 @@ class EllipseArc:
     lift = 0.0
     lift_by = MappingProxyType({})
 
+    @property
+    def is_quarter(self):
+        """Whether the arc is a quarter of an ellipse about the origin."""
+        return (self.start, self.stop, self.centre_m, self.offset_m) == (0.0, np.pi / 2, 0.0, 0.0)
+
     def at(self, u):
         """Return x, r, and dx/du."""
         sin, cos = np.sin(u), np.cos(u)
@@ -478,10 +484,66 @@ class Cut:
         return np.maximum(self.radius_m - self.height_m, 0.0)
 
 
+@dataclass(frozen=True)
+class Cap:
+    """Half of an ellipsoid below a surface parallel to its axis; integrals over x as in `Cut`.
+
+    With d = R + c the depth of the liquid, the volume is that of half a cap, pi a d^2 (3 R - d) /
+    (6 R), and the free surface is half an ellipse of semi-axes a q and R q, q^2 = 1 - (c / R)^2.
+
+    Attributes
+    ----------
+    arc : EllipseArc
+        Quarter of an ellipse about the origin.
+    level_m : ndarray, shape (rows,)
+        Height of the liquid surface above the axis.
+    """
+
+    arc: "EllipseArc"
+    level_m: np.ndarray
+
+    def segment(self):
+        """Return the volume of the liquid, m3."""
+        return np.pi / 6 * self.arc.along_m * self._depth**2 * (3 - self._depth / self._radius)
+
+    def chord(self):
+        """Return the area of the free surface, m2."""
+        return np.pi / 2 * self.arc.along_m * self._radius * self._surface_square
+
+    def chord_moment(self):
+        """Return the integral of x over the free surface, m3."""
+        return 2 / 3 * self.arc.along_m**2 * self._radius * self._surface_square**1.5
+
+    def by(self, name):
+        """Return the derivative of the volume by an input of the arc, at a fixed level."""
+        _, _, by_along, by_across = self.arc.by_input.get(name, np.zeros(4))
+        share = self._depth / self._radius
+        by_radius = np.pi / 6 * self.arc.along_m * self._depth * (6 - share * (3 - share))
+        return self.segment() / self.arc.along_m * by_along + by_radius * by_across
+
+    @property
+    def _radius(self):
+        return self.arc.across_m
+
+    @property
+    def _depth(self):
+        return np.clip(self._radius + self.level_m, 0.0, 2 * self._radius)
+
+    @property
+    def _surface_square(self):
+        """Square q^2 of the ratio of the semi-axes of the free surface to those of the arc."""
+        share = self._depth / self._radius
+        return share * (2 - share)
+
+
+SEGMENT, CHORD, CHORD_MOMENT = map(methodcaller, ("segment", "chord", "chord_moment"))
+
+
 def integrate(arc, level_m, slope, integrands, nodes=NODES):
     """Return integrals (integrands, rows) over x along an arc, below the line level_m - slope x.
 
-    If the centres of the sections rise, the line falls more steeply relative to them.
+    If the centres of the sections rise, the line falls more steeply relative to them. Half an
+    ellipsoid below a level surface has a closed form (`Cap`).
 
     Parameters
     ----------
@@ -491,7 +553,7 @@ def integrate(arc, level_m, slope, integrands, nodes=NODES):
     slope : float
         Fall of that height per metre of x.
     integrands : sequence of callable
-        Functions of a `Cut`, such as Cut.segment.
+        Functions of a `Cut` or `Cap`, such as SEGMENT.
     nodes : int, optional
         Gauss nodes of each panel.
 
@@ -500,6 +562,8 @@ def integrate(arc, level_m, slope, integrands, nodes=NODES):
     ndarray, shape (integrands, rows)
     """
     level_m, slope = np.asarray(level_m, dtype=float), slope + arc.lift
+    if slope == 0 and isinstance(arc, EllipseArc) and arc.is_quarter:
+        return np.array([integrand(Cap(arc, level_m)) for integrand in integrands])
     row, parameter, weight = _wet_nodes(arc, level_m, slope, nodes)
     x, radius, step = arc.at(parameter)
     sections = Cut(arc, parameter, x, radius, level_m[row, None] - slope * x)

@@ -22,13 +22,26 @@ the bottom or the top of a ring (`heads.integrate`).
 """
 
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
+from operator import methodcaller
 
 import numpy as np
 
 from tankcal.errors import HeightError, SolutionError
 from tankcal.messages import message
-from tankcal.tank.heads import RADII, Cut, EllipseArc, End, Line, depth_of, integrate, meridian
+from tankcal.tank.heads import (
+    CHORD,
+    CHORD_MOMENT,
+    RADII,
+    SEGMENT,
+    Cut,
+    EllipseArc,
+    End,
+    Line,
+    depth_of,
+    integrate,
+    meridian,
+)
 from tankcal.tank.parts import Solid
 
 ROUNDING = 1e-9  # relative to the highest dip: a smaller excess is rounding
@@ -74,18 +87,18 @@ class LyingSolid(Solid):
     def capacity_m3(self):
         """Volume of the full tank, m3."""
         full = np.array([2 * max(piece.arc.at(piece.arc.start)[1] for piece in self._pieces)])
-        volumes = (piece.sign * integrate(piece.arc, full, 0.0, [Cut.segment])[0, 0]
+        volumes = (piece.sign * integrate(piece.arc, full, 0.0, [SEGMENT])[0, 0]
                  for piece in self._pieces)  # fmt: skip
         return float(sum(volumes))
 
     def volume_m3(self, levels_m):
         """Return the volume (rows,) below each dip."""
-        return self._sum(levels_m, Cut.segment)
+        return self._sum(levels_m, SEGMENT)
 
     def area_m2(self, levels_m):
         """Return the derivative (rows,) of the volume by the dip; plumb: the free surface."""
         # Chain rule: dip to depth, depth to the height in the round tank, height to volume.
-        return self._squeeze * self._depth_slope * self._sum(levels_m, Cut.chord)
+        return self._squeeze * self._depth_slope * self._sum(levels_m, CHORD)
 
     def depth_m(self, levels_m):
         """Return depths (rows,), perpendicular to the axis, in the section of the dip."""
@@ -361,10 +374,10 @@ class RingedTank(LyingSolid):
                          depths of the ends, but not the lengths
         paint            thickness subtracted from the radii alone
         """
-        integrands = [Cut.segment, Cut.chord, Cut.chord_moment]
+        integrands = [SEGMENT, CHORD, CHORD_MOMENT]
         inputs = ("radius", "end_depth", "end_plate", *RADII)
-        integrands += [partial(Cut.by, name=name) for name in inputs]
-        cylinder = [*integrands, *(partial(Cut.by_wave, order=order) for order in WAVES)]
+        integrands += [methodcaller("by", name) for name in inputs]
+        cylinder = [*integrands, *(methodcaller("by_wave", order) for order in WAVES)]
         integrals = [
             (piece, self._integrals(piece, levels_m, integrands if piece.end else cylinder))
             for piece in self._pieces

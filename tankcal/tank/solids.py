@@ -31,14 +31,15 @@ equally smooth.
 """
 
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
+from operator import methodcaller
 
 import numpy as np
 import scipy
 
 from tankcal.errors import SolutionError
 from tankcal.messages import message
-from tankcal.tank.heads import RADII, Cut, End, Line
+from tankcal.tank.heads import CHORD, CHORD_MOMENT, RADII, SEGMENT, End, Line
 from tankcal.tank.lying import (
     LyingSolid,
     Piece,
@@ -186,9 +187,9 @@ class LyingTank(LyingSolid):
         scale            scale of all lengths of the tank and of the position of the dip, but not of
                          the dips
         """
-        integrands = [Cut.segment, Cut.chord, Cut.chord_moment]
+        integrands = [SEGMENT, CHORD, CHORD_MOMENT]
         inputs = ("radius", "end_depth", "end_plate", *RADII)
-        integrands += [partial(Cut.by, name=name) for name in inputs]
+        integrands += [methodcaller("by", name) for name in inputs]
         integrals = [
             (piece, self._integrals(piece, levels_m, integrands)) for piece in self._pieces
         ]

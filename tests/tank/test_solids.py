@@ -2,6 +2,7 @@
 
 import itertools
 from dataclasses import replace
+from operator import methodcaller
 
 import numpy as np
 import pytest
@@ -12,7 +13,16 @@ from hypothesis import strategies as st
 from jacobians import assert_derivative
 
 from tankcal.errors import HeightError, SolutionError
-from tankcal.tank.heads import KINDS, Cut, End, depth_of, integrate, meridian
+from tankcal.tank.heads import (
+    CHORD,
+    CHORD_MOMENT,
+    KINDS,
+    SEGMENT,
+    End,
+    depth_of,
+    integrate,
+    meridian,
+)
 from tankcal.tank.solids import FLAT, LyingTank, Sphere
 
 INCH = 0.0254
@@ -320,6 +330,21 @@ def test_rolled_and_tilted_elliptical_tanks_second_method(a, b, tilt, roll, dip,
 # properties
 
 
+@pytest.mark.parametrize("depth", [0.01, 0.5, 3.0])
+def test_level_ellipsoidal_ends_second_method(depth, figure):
+    """Closed form of half an ellipsoid against slices of 24 nodes, under a fall of 1e-300."""
+    near = 10.0 ** -np.arange(1, 13)
+    levels = np.concatenate([np.linspace(-1.3, 1.3, 105), 1 - near, near - 1, 1 + near])
+    (arc,) = meridian(End("ellipsoidal", depth), 1.0)
+    inputs = [methodcaller("by", name) for name in ("radius", "end_depth", "end_plate")]
+    integrands = [SEGMENT, CHORD, CHORD_MOMENT, *inputs]
+    closed, sliced = (integrate(arc, levels, slope, integrands) for slope in (0.0, 1e-300))
+    worst = np.abs(closed - sliced).max(axis=1) / np.abs(sliced).max(axis=1)
+    shown = ", ".join(f"{one:.1e}" for one in worst)
+    figure(f"ellipsoidal, depth {depth:g}, closed form against slices, of the end's", shown)
+    assert worst.max() < 1e-12
+
+
 @pytest.mark.slow(after=1)
 @pytest.mark.parametrize("kind", KINDS[1:])
 def test_more_nodes_change_nothing(kind, figure):
@@ -330,8 +355,7 @@ def test_more_nodes_change_nothing(kind, figure):
     for end, slope in itertools.product(variants(kind), [0, 1e-6, 1e-4, 0.01, 0.07, -0.18, 1.0]):
         for arc in meridian(end, 1.0):
             few, many = (
-                integrate(arc, levels, slope, [Cut.segment, Cut.chord], nodes)
-                for nodes in (24, 150)
+                integrate(arc, levels, slope, [SEGMENT, CHORD], nodes) for nodes in (24, 150)
             )
             worst = np.maximum(worst, np.abs(few - many).max(axis=1) / np.abs(many).max(axis=1))
     shown = ", ".join(f"{one:.1e}" for one in worst)
