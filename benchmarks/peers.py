@@ -4,6 +4,7 @@
 
 The peers are the extra `peers` of pyproject.toml. Each is installed by itself; what cannot be is
 kept with the installer's last words in errors.json there, and the page of the benchmarks names it.
+For programs that are no package of Python, the package manager is asked and installs nothing.
 Nothing is installed beside tankcal itself: its tests run without any of this.
 """
 
@@ -17,6 +18,10 @@ import venv
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+PROGRAMS = {
+    "GNU Gama": ["apt-get", "--simulate", "install", "gama"],
+    "JAG3D": ["mvn", "-q", "-B", "dependency:get", "-Dartifact=org.applied-geodesy:jag3d:LATEST"],
+}
 
 
 def main(folder):
@@ -36,6 +41,14 @@ def main(folder):
             name = re.match(r"[\w.-]+", peer).group()
             errors[name] = told(done.stderr)
             print(f"{name} could not be installed: {errors[name]}")
+    for name, command in PROGRAMS.items():
+        try:
+            done = subprocess.run(command, capture_output=True, text=True)
+            wrong = missed(done.stdout + done.stderr) if done.returncode else ""
+        except OSError as error:
+            wrong = f"{command[0]}: {error.strerror}"
+        errors[name] = wrong or "a package exists, not measured yet"
+        print(f"{name}: {errors[name]}")
     (Path(folder) / "errors.json").write_text(json.dumps(errors, indent=1), encoding="utf-8")
 
 
@@ -49,6 +62,16 @@ def told(text):
     """The last error of the installer, one line, without the addresses that it tried."""
     lines = [line for line in text.splitlines() if line.startswith("ERROR")] or [text.strip()]
     return re.sub(r"\w+://\S+", "...", lines[-1].removeprefix("ERROR: "))[:200]
+
+
+def missed(text):
+    """What apt-get or Maven did not find, in its words.
+
+    >>> missed("Reading...\\nE: Unable to locate package gama")
+    'Unable to locate package gama'
+    """
+    words = re.search(r"(Unable to locate|Could not find) \w+ [\w.:/-]+", text)
+    return words[0] if words else text.strip()[-200:]
 
 
 if __name__ == "__main__":

@@ -38,6 +38,8 @@ BENCHMARKS = {
     "clouds": (),
     "cloud_cells": (),
     "cloud_peers": (),
+    "cloud_readers": (),
+    "workbook": (),
     "planning": (str(ROUNDS),),
     "exports": (),
     "ships": (),
@@ -45,6 +47,7 @@ BENCHMARKS = {
     "app": (),
     "growth": (),
     "adjustment/run": (),
+    "adjustment/network": (),
 }
 
 

@@ -2,15 +2,18 @@
 //
 //   ceres_peer tank problem.bin     a tank network, as written by sim_tank.py
 //   ceres_peer bal problem.txt      "Bundle Adjustment in the Large"
+//   ceres_peer network problem.txt  a geodetic network, as written by network.py
 //
 // Then one command a line on standard input, one line of JSON on standard output for each:
 //   solve SOLVER RADIUS FTOL        from the start values; RADIUS is initial_trust_region_radius
-//   covariance full | marginal      of all points, at the last solution
+//   covariance full | marginal | points    of all points, at the last solution; points: with
+//                                   their coordinates and standard deviations
 //   version                         of Ceres
 // SOLVER: SPARSE_NORMAL_CHOLESKY (Ceres' default), SPARSE_SCHUR, DENSE_SCHUR
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 
+#include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <fstream>
@@ -92,6 +95,24 @@ struct BalImage {
   }
 };
 
+// A reading of a total station: horizontal direction (0), zenith angle (1), distance (2).
+struct Sight {
+  int kind;
+  double value, weight;
+  template <typename T>
+  bool operator()(const T* const from, const T* const to, const T* const turn, T* out) const {
+    const T d[3] = {to[0] - from[0], to[1] - from[1], to[2] - from[2]};
+    const T p = sqrt(d[0] * d[0] + d[1] * d[1]);
+    if (kind == 0) {
+      const T off = atan2(d[0], d[1]) - turn[0] - value;
+      out[0] = atan2(sin(off), cos(off)) * weight;  // from -pi to pi
+    } else {
+      out[0] = ((kind == 1 ? atan2(p, d[2]) : sqrt(p * p + d[2] * d[2])) - value) * weight;
+    }
+    return true;
+  }
+};
+
 struct Peer {
   Vector start, now;                // all unknowns
   std::vector<double*> points;      // blocks of three
@@ -166,6 +187,37 @@ void LoadBal(const char* path, Peer* peer) {
   for (int i = 0; i < points; ++i) peer->points.push_back(base + 9 * cameras + 3 * i);
 }
 
+void LoadNetwork(const char* path, Peer* peer) {
+  std::ifstream file(path);
+  int stations, points, sights, controls;  // stations are the first points, a set of directions each
+  file >> stations >> points >> sights >> controls;
+  peer->start.resize(3 * points + stations);
+  for (double& value : peer->start) file >> value;
+  peer->now = peer->start;
+  double* base = peer->now.data();
+  for (int i = 0; i < sights; ++i) {
+    int kind, from, to;
+    double value, sd;
+    file >> kind >> from >> to >> value >> sd;
+    peer->problem->AddResidualBlock(
+        new ceres::AutoDiffCostFunction<Sight, 1, 3, 3, 1>(new Sight{kind, value, 1 / sd}),
+        nullptr, base + 3 * from, base + 3 * to, base + 3 * points + from);
+  }
+  for (int i = 0; i < controls; ++i) {
+    int point;
+    double x, y, z, sd;
+    file >> point >> x >> y >> z >> sd;
+    peer->problem->AddResidualBlock(
+        new ceres::AutoDiffCostFunction<Control, 3, 3>(new Control{{x, y, z}, 1 / sd}), nullptr,
+        base + 3 * point);
+  }
+  for (int i = 0; i < stations; ++i) {
+    peer->in_distances.push_back(base + 3 * i);
+    peer->others.push_back(base + 3 * points + i);
+  }
+  for (int i = 0; i < points; ++i) peer->points.push_back(base + 3 * i);
+}
+
 void Solve(Peer* peer, const std::string& solver, double radius, double ftol) {
   ceres::Solver::Options options;
   ceres::StringToLinearSolverType(solver, &options.linear_solver_type);
@@ -214,13 +266,25 @@ void PointCovariance(Peer* peer, const std::string& kind) {
     covariance.GetCovarianceBlock(point, point, block);
     trace += block[0] + block[4] + block[8];
   }
-  std::printf("{\"seconds\": %.6e, \"trace\": %.12e}\n", seconds, trace);
+  std::printf("{\"seconds\": %.6e, \"trace\": %.12e", seconds, trace);
+  if (kind == "points") {
+    std::printf(", \"points\": [");
+    for (size_t i = 0; i < peer->points.size(); ++i) {
+      const double* p = peer->points[i];
+      covariance.GetCovarianceBlock(p, p, block);
+      std::printf("%s[%.15e, %.15e, %.15e, %.12e, %.12e, %.12e]", i ? ", " : "", p[0], p[1], p[2],
+                  std::sqrt(block[0]), std::sqrt(block[4]), std::sqrt(block[8]));
+    }
+    std::printf("]");
+  }
+  std::printf("}\n");
 }
 
 int main(int argc, char** argv) {
   google::InitGoogleLogging(argv[0]);
   Peer peer;
-  (std::string(argv[1]) == "tank" ? LoadTank : LoadBal)(argv[2], &peer);
+  const std::string problem = argv[1];
+  (problem == "tank" ? LoadTank : problem == "bal" ? LoadBal : LoadNetwork)(argv[2], &peer);
   for (std::string line; std::getline(std::cin, line); std::fflush(stdout)) {
     std::istringstream words(line);
     std::string command, what;
