@@ -119,6 +119,51 @@ def test_u_of_offset_and_slope_for_equal_variances(n):
     assert dof == pytest.approx(np.square(expected) * nu / fourths, rel=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("levels", "dips_mm", "expected"),
+    [
+        ([2, 6, 11], 1.0, [1.378, 0.826, 0.176, 1.308]),
+        ([2, 6, 11], 2.0, [2.420, 1.297, 0.324, 2.254]),
+        ([1, 3.5, 6, 8.5, 11], 1.0, [1.105, 0.717, 0.143, 1.130]),
+    ],
+)
+def test_u_to_the_printed_digit(levels, dips_mm, expected):
+    """Offset at 0 and at the mean level, scale, and deviation at 12 m: another author's numbers.
+
+    Gauge 0.5 mm, zero of the tape 0.5 mm, tape 20 ppm; the scatter is declared, without pooling.
+    """
+    levels = np.array(levels, float)
+    shared = {"zero": np.full(len(levels), 5e-4), "scale": 2e-5 * levels}
+    line = fit_line(dips_of(levels, scatter=np.hypot(dips_mm, 0.5) / 1000, **shared))
+    mean, total = line.mean_level_m, np.zeros(4)
+    rows = np.array([[1, -mean], [1, 0], [0, 1], [1, 12 - mean]])
+    for source in line.sources:
+        factor = line.scatter_factor if source.kind == "scatter" else 1.0
+        columns = np.reshape(source.columns_m3, (2, -1)) / factor
+        total += np.sum((rows @ columns) ** 2, axis=1)
+    assert (1000 * np.sqrt(total)).round(3).tolist() == expected
+
+
+def test_three_levels_do_not_determine_a_scale():
+    """Differences 2.3, 2.6, 3.4 mm: offset 1.9828, slope 0.1238 mm/m with w 0.70, chi2 0.019.
+
+    With the scale as a known cause, the offset is 2.7566 mm. A pipe that leans by 0.5, 1 or 2
+    degrees has a slope of 38, 152, 610 ppm.
+    """
+    levels = np.array([2.0, 6.0, 11.0])
+    shared = {"zero": np.full(3, 5e-4), "scale": 2e-5 * levels}
+    dips = dips_of(levels, [0.0023, 0.0026, 0.0034], np.hypot(1.0, 0.5) / 1000, **shared)
+    line = fit_line(dips)
+    offset, slope = line.unknowns
+    assert round(1000 * (offset - line.mean_level_m * slope), 4) == 1.9828
+    assert round(1000 * slope, 4) == 0.1238
+    assert round(slope / 0.176e-3, 2) == 0.70
+    assert round(line.sigma0**2, 3) == 0.019
+    assert round(1000 * fit_line(dips, KnownSlope(0.0, 0.0)).unknowns[0], 4) == 2.7566
+    slopes = [slope_of_tilt(np.radians(tilt), 0.0)[0] for tilt in (0.5, 1.0, 2.0)]
+    assert np.round(1e6 * np.array(slopes)).tolist() == [38, 152, 610]
+
+
 def plain_line(level, deviation, scatter, shared, at, probability):
     """(a, b, [(D, U)], whether residuals count alone): sums by hand, one for each source."""
     # Only independent errors weight the readings: a constant and a scale are part of the line.

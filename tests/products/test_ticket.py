@@ -63,6 +63,82 @@ def test_chain_to_its_last_printed_digit():
         assert round(float(getattr(steps, name)[0]), decimals) == value, name
 
 
+@pytest.fixture(scope="module")
+def worked_transfer():
+    """A delivery worked by another author, with three courses, a bottom and a scale."""
+    height = np.array([0.0, 0.9, 1.8, 3.6, 6.0, 8.4])
+    volume = np.array([0.0, 146.708, 293.425, 586.885, 978.261, 1369.710])
+    courses = [2 * np.pi * 7.2 * 3e-4 * np.clip(height - low, 0, 2.8) for low in (0, 2.8, 5.6)]
+    factor = np.column_stack([108e-6 * volume, np.full(6, 0.3), *courses])
+    table = TankTable("t", "vertical", height, volume, factor, np.full(6, np.inf), 0.0, 20.0,
+                      1.116e-5)  # fmt: skip
+    product = Product(Petroleum(1980, "products", "15C"), np.array([845.0]), None, np.ones(1),
+                      np.array([0.0005]), np.array([1.116e-5]))  # fmt: skip
+    return _transfer(
+        table, _gauging(8.4, 0.02, 27.4, 22.0), _gauging(1.8, 0.02, 24.1, 20.0), product,
+        u_tape_ppm=50.0, u_water_dip_mm=2.0, u_temperature_k=0.2, u_thermometer_k=0.0,
+        u_ambient_k=1.0, u_sw_percent=0.02, u_expansion_per_k=0.0, u_vcf_percent=0.0,
+    )  # fmt: skip
+
+
+def test_quantities_to_the_printed_digit(worked_transfer):
+    expected = {
+        "opening": (1.000150, 1366.6549, 0.989587, 1352.4234, 1351.7472, 1_142_226.4),
+        "closing": (1.000080, 290.1881, 0.992364, 287.9722, 287.8282, 243_214.8),
+    }
+    for state, values in expected.items():
+        steps, names = worked_transfer.steps[state], ("ctsh", "gov_m3", "vcf", "gsv_m3", "nsv_m3")
+        found = [float(getattr(steps, name)[0]) for name in (*names, "mass_kg")]
+        decimals = (6, 4, 6, 4, 4, 1)
+        assert tuple(round(value, n) for value, n in zip(found, decimals, strict=True)) == values
+    moved = -worked_transfer.quantities()["moved"].value[0]
+    assert moved[1:4].round(4).tolist() == [1076.4669, 1064.4513, 1063.9190]
+    assert round(float(moved[4]), 1) == 899_011.6
+
+
+def test_budget_to_the_printed_digit(worked_transfer):
+    """Contributions to the delivered NSV in m3, and U; the zero of the tape is common to both dips.
+
+    The author differentiates the table at its last row, where half of the difference is missing
+    (0.0807 for 0.1613), and has no zero of the tape at the closing dip. With these two slips our
+    budget is that of the author to a unit of the last digit: U 1.0935, 0.7455 and 1.2386. Without
+    them it is 1.1433, 0.7629 and 1.2710.
+    """
+    found = worked_transfer.quantities()
+    moved = {name: float(values[0, NSV]) for name, values in found["moved"].contributions.items()}
+    expected = {
+        "water dip closing": 0.3234, "water dip opening": 0.3225, "temperature opening": 0.2248,
+        "temperature closing": 0.0477, "sw": 0.2129, "dip closing": 0.1617, "table": 0.1273,
+        "dip opening": 0.1613,
+    }  # fmt: skip
+    assert {name: round(abs(moved[name]), 4) for name in expected} == expected
+    assert round(-found["moved"].contributions["density"][0, 4]) == 540  # kg, of the mass
+    level = {"opening": 8.4, "closing": 1.8}
+    # The correction has a relative u of 0.025 % at 22 K from its base, in proportion.
+    by_correction = {"opening": 0.00025 * 12.4 / 22 * 1351.7472,
+                     "closing": 0.00025 * 9.1 / 22 * 287.8282}  # fmt: skip
+    slips = {"opening": (0.5, 1.0), "closing": (1.0, 0.0)}  # slope of the dip, zero of the tape
+    for state, signs, by_author, right in (
+        ("opening", {"opening": 1}, 1.0935, 1.1433),
+        ("closing", {"closing": 1}, 0.7455, 0.7629),
+        ("moved", {"opening": -1, "closing": 1}, 1.2386, 1.2710),
+    ):
+        parts = found[state].contributions
+        others = [values[0, NSV] for name, values in parts.items()
+                  if name != "tape" and not name.startswith("dip")]  # fmt: skip
+        correction = sum(sign * by_correction[name] for name, sign in signs.items())
+        for author, expected_U in ((True, by_author), (False, right)):
+            dips, tape, zero = [], 0.0, 0.0
+            for name, sign in signs.items():
+                share, has_zero = slips[name] if author else (1.0, 1.0)
+                slope = sign * share * found[name].contributions[f"dip {name}"][0, NSV]
+                dips.append(slope)
+                tape += 0.05 * level[name] * slope
+                zero += 0.5 * has_zero * slope
+            U = 2 * np.linalg.norm([*others, correction, *dips, tape, zero])
+            assert pytest.approx(expected_U, abs=1e-4 if author else 5e-5) == U
+
+
 def test_chain_against_a_plain_implementation():
     rng = np.random.default_rng(7)
     table = _cylinder(with_roof=True)

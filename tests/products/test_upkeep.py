@@ -20,8 +20,9 @@ from tankcal.products.upkeep.causes import PRIORS, Operation, TableStock
 from tankcal.products.upkeep.clocks import find_offset_s
 from tankcal.products.upkeep.estimation import estimate
 from tankcal.products.upkeep.flows import MeterFlow
+from tankcal.products.upkeep.reading import read_upkeep
 from tankcal.products.upkeep.steps import Marks, Steps
-from tankcal.products.upkeep.upkeep import _error_ratio, update_table
+from tankcal.products.upkeep.upkeep import _error_ratio, keep_up, update_table
 from tankcal.products.upkeep.watching import watch
 
 START = np.datetime64("2025-01-06T00:00:00", "ns").astype(np.int64)
@@ -155,21 +156,54 @@ def test_deliveries_of_stations_from_drawings_hold():
 # ---- planted faults
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2, 3])
-@pytest.mark.parametrize(
-    ("kind", "size", "unit"),
-    [("leak", 0.757, 1), ("zero", 0.003, 1000), ("meter", 0.01, 100), ("ticket", 0.02, 100)],
-)
-def test_planted_faults_are_named(table, kind, size, unit, seed):
-    """A fault of day 80 is found before day 120, and named, or named among the inseparable."""
-    year = draw_year(np.random.default_rng(seed), table, days=120, faults={kind: (80.0, size)})
+FAULTS = {"leak": (0.757, 1), "zero": (0.003, 1000), "meter": (0.01, 100), "ticket": (0.02, 100)}
+
+
+def find_fault(table, kind, seed, days, begin):
+    """Suspect of the planted kind, which is named alone or among the inseparable causes."""
+    size, unit = FAULTS[kind]
+    year = draw_year(np.random.default_rng(seed), table, days=days, faults={kind: (begin, size)})
     watched = watch(estimate(year.operation, year.steps))
-    assert 79 < watched.alarm_s / 86400 < 119
+    assert begin - 1 < watched.alarm_s / 86400 < days - 1
     suspect = next(cause for cause in watched.names if cause.kind == kind)
     assert suspect.member in (None, "1")
-    assert abs(suspect.size - unit * size) < 4 * suspect.sd + 0.1 * unit * size
+    assert abs(suspect.size - unit * size) < 3 * suspect.sd
     assert watched.is_named or len(watched.names) > 1
+    return suspect
+
+
+def test_planted_leak_is_named(table):
+    """A leak of day 38.3: its beginning within two days, its rate within 3 u."""
+    suspect = find_fault(table, "leak", 1, 60, 38.3)
+    assert suspect.start_s / 86400 == pytest.approx(38.3, abs=2.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("kind", FAULTS)
+def test_planted_faults_are_named(table, kind, seed):
+    """A fault of day 80 is found before day 120, and named, or named among the inseparable."""
+    find_fault(table, kind, seed, 120, 80.0)
+
+
+@pytest.mark.study
+def test_rates_of_early_leaks_hold(table):
+    """Leaks of 0.757 L/h after 20 days, with beginnings on all days of a week: rate within U.
+
+    Weekly beginnings alone made such rates up to 2.7 u too small. docs/studies/upkeep.md has 168.
+    """
+    ratios = []
+    for seed in range(35):
+        rng = np.random.default_rng(20000 + seed)
+        begin = 100 + seed % 7 + rng.random()
+        year = draw_year(rng, table, days=int(begin) + 20, faults={"leak": (begin, 0.757)})
+        watched = watch(estimate(year.operation, year.steps))
+        leak = next(cause for cause in watched.names if cause.kind == "leak")
+        ratios.append((leak.size - 0.757) / leak.sd)
+    print("leaks, share within U, mean and rms of error over u:", np.mean(np.abs(ratios) < 1.96),
+          np.mean(ratios), np.sqrt(np.mean(np.square(ratios))))  # fmt: skip
+    assert np.mean(np.abs(ratios) < 1.96) >= 0.88  # 31 of 35: 2 % of valid runs are lower
+    assert abs(np.mean(ratios)) < 0.55
 
 
 @pytest.mark.slow
@@ -228,6 +262,40 @@ def write_logs(folder, record, days, seed=7, **values):
     data = Station(days=days, tank=tank, period_s=300.0, **values).run(np.random.default_rng(seed))
     write_station(folder, data)
     shutil.copy(record, folder)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("kind", ["late", "jump", "drift"])
+def test_wrong_clocks_are_named(record, tmp_path, kind, seed):
+    """A clock 600 s late, set by an hour on day 30, or losing 20 s a day: warning and cause.
+
+    Levels are then read during sales. The alarm names the clock beside the other causes.
+    """
+    former, folder = read_table(record), tmp_path / "station"
+    tank = TrueTank()
+    tank.grid, tank.volume = former.height_m, former.volume_m3
+    data = Station(days=60, tank=tank).run(np.random.default_rng(seed))
+    time, level = data["levels"]
+    shift = {"late": 600.0, "jump": np.where(time > 30 * 86400, 3600.0, 0.0),
+             "drift": 20 * time / 86400}[kind]  # fmt: skip
+    data["levels"] = time + shift, level
+    write_station(folder, data)
+    shutil.copy(record, folder)
+    inputs = read_upkeep(folder)
+    offset = {"late": 600, "jump": 3600, "drift": 1200}[kind]
+    # A week of drift is 140 s.
+    assert inputs.clock[1] == pytest.approx(offset, abs=200 if kind == "drift" else 60)
+    assert any("clock" in str(warning) for warning in inputs.warnings)
+    watched = keep_up(inputs).watch
+    assert watched.alarm is not None
+    assert not watched.is_named
+    clock = watched.suspects[0]
+    assert clock.kind == "clock"
+    assert clock.is_possible
+    day = (np.datetime64(clock.day) - np.datetime64("2025-01-06")).astype(int)
+    first, last = {"late": (0, 1), "jump": (29, 37), "drift": (2, 15)}[kind]
+    assert first <= day <= last
 
 
 def divide_by_month(folder):

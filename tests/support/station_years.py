@@ -82,7 +82,8 @@ def draw_year(rng, table, *, days=365, sizes=SURVEY, marks=6, faults=None):
     gone = gone * (1 + max(0.0005 + 0.0003 * rng.normal(), 0.0))
     leak = np.full(len(sold), max(0.04 + 0.03 * rng.normal(), 0.0))
     if "leak" in faults:
-        leak += np.where(day[:-1] >= faults["leak"][0], faults["leak"][1], 0.0)
+        begin, size = faults["leak"]
+        leak += size * np.clip((day[1:] - begin) / np.diff(day), 0, 1)
     gone = gone + leak * seconds / 3.6e6
     bias = 0.0015 * rng.normal()
     stock, stocks, layer = 14.0, [14.0], 0.0

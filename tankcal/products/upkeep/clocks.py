@@ -6,6 +6,7 @@ import pandas as pd
 MOST_OFFSET_S, OFFSET_STEP_S = 7200, 60  # searched offsets of two clocks
 LEAST_SALES = 30  # for an offset
 MOST_STEP_M3 = 0.3  # change of the stock in a row beyond it: a delivery
+LARGEST_MISFIT = 0.6  # of a right offset, relative to that of an offset two hours away
 SWITCH_NS = 900 * 10**9  # smallest fall of a local time that is the change of the clock
 NOT_A_TIME = np.iinfo(np.int64).min  # NaT as an integer
 
@@ -75,7 +76,7 @@ class LocalClock:
         return (marked.asi8 == NOT_A_TIME) & (local_ns != NOT_A_TIME)
 
 
-def find_offset_s(time_ns, stock_m3, flows):
+def find_offset_s(time_ns, stock_m3, flows, last_s=None):
     """Estimate how late the clock of a level log is, by falls of the level and metered volumes.
 
     Stock and metered volume have a constant sum between deliveries. The sum of the absolute changes
@@ -87,23 +88,33 @@ def find_offset_s(time_ns, stock_m3, flows):
         Ascending.
     stock_m3 : ndarray, shape (n,)
     flows : sequence of flows.MeterFlow
+    last_s : float, optional
+        Offset of earlier rows. It is kept without a search if it fits better than its neighbours.
 
     Returns
     -------
     float or None
         Seconds; None with too few sales.
     """
-    offsets = np.arange(-MOST_OFFSET_S, MOST_OFFSET_S + 1, OFFSET_STEP_S)
-    change, sums, sales = np.diff(stock_m3), np.zeros(len(offsets)), 0
-    middles = []
+    change, sales, middles, margin = np.diff(stock_m3), 0, [], MOST_OFFSET_S * 10**9
     for flow in flows:
-        middle = flow.begin_ns // 2 + flow.time_ns // 2
+        low = np.searchsorted(flow.time_ns, time_ns[0] - margin)
+        high = np.searchsorted(flow.time_ns, time_ns[-1] + 2 * margin)
+        middle = np.sort(flow.begin_ns[low:high] // 2 + flow.time_ns[low:high] // 2)
         sales += int(np.sum((middle > time_ns[0]) & (middle < time_ns[-1])))
-        middles.append((np.sort(middle), flow.total_m3))
+        middles.append((middle, flow.total_m3[low : high + 1]))
     if sales < LEAST_SALES:
         return None
-    for place, offset in enumerate(offsets):
+
+    def misfit(offset):
         at = time_ns - int(offset) * 10**9
         sold = sum(total[np.searchsorted(middle, at)] for middle, total in middles)
-        sums[place] = np.minimum(np.abs(change + np.diff(sold)), MOST_STEP_M3).sum()
-    return float(offsets[np.argmin(sums)])
+        return np.minimum(np.abs(change + np.diff(sold)), MOST_STEP_M3).sum()
+
+    if last_s is not None:
+        best, *near = (misfit(last_s + OFFSET_STEP_S * step) for step in (0, -2, -1, 1, 2))
+        # A wrong offset may be better than its neighbours by chance, but not than all sales.
+        if best < min(near) and best < LARGEST_MISFIT * misfit(last_s + MOST_OFFSET_S):
+            return last_s
+    offsets = np.arange(-MOST_OFFSET_S, MOST_OFFSET_S + 1, OFFSET_STEP_S)
+    return float(offsets[np.argmin([misfit(offset) for offset in offsets])])

@@ -11,7 +11,8 @@ from tankcal.products.upkeep.state import NO_STATE
 PIECE_NS = 3600 * 10**9  # longest piece of a quiet window
 STUCK_STEPS = 8  # movement of the level, in quanta, that a stuck float has missed
 LINE_ROWS, LINE_M = 6, 1e-9  # a straight line through so many rows is an interpolation
-CLOCK_ROWS = 1500  # rows of a chunk by which the clocks are compared
+CLOCK_ROWS, CLOCK_STEP_NS = 1500, 240 * 10**9  # rows that compare the clocks, and their distance
+CLOCK_NS = 7 * 86400 * 10**9  # between two comparisons
 MOST_OFFSET_S = 60.0  # between two clocks; a larger offset causes a warning
 OVERLAP = 400_000  # rows in which a late row is compared with earlier rows
 
@@ -282,15 +283,22 @@ class LevelSums:
         return None if time is None or not len(start) else (start[-1], end[-1], value[-1])
 
     def _compare_clocks(self, time, level, file):
-        """Compare the clocks of levels and meters by the first rows of a chunk."""
-        time, level = time[:CLOCK_ROWS], level[:CLOCK_ROWS]
+        """Compare the clocks of levels and meters by the first rows of each week of a chunk."""
         if len(time) < 2:
             return
-        offset = find_offset_s(time, self.volume_m3(level), self.flows)
-        if offset is not None:
-            self._clocks.append((float(time[0]), offset))
-            if abs(offset) > MOST_OFFSET_S + np.median(np.diff(time)) * 0.5e-9:
-                file.findings.add("levels", "clock_offset", time[[0, -1]], len(time))
+        # A sale takes minutes: closer rows share it, and do not show the offset.
+        spacing = max(np.median(np.diff(time)), 1)
+        stride, most = int(CLOCK_STEP_NS // spacing) + 1, MOST_OFFSET_S + 0.5e-9 * spacing
+        for start in np.flatnonzero(np.diff(time // CLOCK_NS, prepend=-1)):
+            part = slice(start, start + CLOCK_ROWS * stride, stride)
+            now, last = time[part], self._clocks[-1][1] if self._clocks else None
+            if len(now) < 2:
+                continue
+            offset = find_offset_s(now, self.volume_m3(level[part]), self.flows, last)
+            if offset is not None:
+                self._clocks.append((float(now[0]), offset))
+                if abs(offset) > most:
+                    file.findings.add("levels", "clock_offset", now[[0, -1]], len(now))
 
     def _add(self, chunk, is_used):
         """Add readings to the sums of their pieces."""

@@ -129,6 +129,8 @@ class Inputs:
         Record of the table in force.
     former_upkeep : dict or None
         Everyday data that this table contains already.
+    clock : tuple of (int, float) or None
+        First time (ns) and largest offset in seconds of a wrong clock of the levels.
     """
 
     sections: dict
@@ -142,6 +144,7 @@ class Inputs:
     folder: Path
     record_path: Path
     former_upkeep: dict | None
+    clock: tuple | None = None
 
     def files(self):
         """`InputFile`s in the order of reading."""
@@ -354,12 +357,14 @@ def _build(sections, table, meters, files, findings, sources, log, state):
         text = message("upkeep_no_steps", "no step between two quiet levels; expected levels "
                        "before and after sales, in a common time zone")  # fmt: skip
         raise InputError(Problem(files["levels"][0].path.name, text))
+    clock = None
     if findings.number("levels", "clock_offset"):
         offset = max((offset for _, offset in sums.offsets), key=abs)
         text = message("upkeep_clock", "the clock of the levels is {offset:.0f} s late against the "
                        "meters (negative: early); expected at most {most:.0f} s", offset=offset,
                        most=MOST_OFFSET_S)  # fmt: skip
         log.warning(files["levels"][0].path.name, text, column="time")
+        clock = int(findings.counts["levels", "clock_offset"][1]), float(offset)
     _judge_cleaning(findings, files["levels"][0].path.name, log)
     log.stop_if_problems()
     operation = Operation(
@@ -375,7 +380,7 @@ def _build(sections, table, meters, files, findings, sources, log, state):
                         "listed; its factor is taken as 1 with the prior u",
                         name=flow.name))  # fmt: skip
     return Inputs(sections, operation, steps, findings, tuple(sources), len(pieces), traceable,
-                  tuple(log.warnings), None, None, None)  # fmt: skip
+                  tuple(log.warnings), None, None, None, clock)  # fmt: skip
 
 
 def _judge_cleaning(findings, file, log):

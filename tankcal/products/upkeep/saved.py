@@ -111,10 +111,10 @@ class UpkeepSuspect(Saved):
     kind: str = key("of the cause")
     member: str | None = key("meter")
     unit: str = key("of size and sd")
-    day: str = key("beginning, UTC")
+    day: str = key("most likely beginning, UTC")
     size: Finite = key("estimate")
-    sd: Finite = key("standard deviation")
-    w: Finite = key("size over sd")
+    sd: Finite = key("standard uncertainty; with the unknown beginning after an alarm")
+    w: Finite = key("size over its standard deviation, for this beginning")
     is_possible: bool = key("whether the data do not distinguish it from the most likely cause")
 
 

@@ -17,7 +17,7 @@ from tankcal.products.upkeep.filtering import whiten_steps
 from tankcal.products.upkeep.reading import SETTINGS
 from tankcal.products.upkeep.state import NO_STATE
 from tankcal.products.upkeep.steps import REASONS
-from tankcal.products.upkeep.watching import SIR_SD, watch
+from tankcal.products.upkeep.watching import SIR_SD, suspect_clock, watch
 from tankcal.record.covariance_factor import blocks_of
 from tankcal.record.texts import warnings_of
 
@@ -64,6 +64,9 @@ def keep_up(inputs, state=NO_STATE):
     former_u = np.linalg.norm(table.factor_m3, axis=1)
     seen = (table.height_m >= low) & (table.height_m <= high)
     watched = watch(estimation, sections["watch"]["false_alarm_per_year"] or 0.05, state)
+    if inputs.clock and watched.alarm_s is not None:
+        watched = suspect_clock(watched, (inputs.clock[0] - inputs.steps.marks.time_ns[0]) * 1e-9,
+                                inputs.clock[1])  # fmt: skip
     reasons = _refusals(estimation, table, low, high, former_u, seen, inputs.traceable)
     if watched.alarm_s is not None:
         reasons.append("alarm")

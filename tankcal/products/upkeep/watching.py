@@ -11,12 +11,21 @@ is nearly right has slow errors that the first limit does not know.
 
 Causes are searched in windows: a period of the estimation and a quarter of a year before it. Each
 cause is therefore tested for a quarter of a year at least, after which its sd hardly falls.
+
+The search has weekly beginnings. After an alarm, the beginning of each suspect is any mark. Its
+size is the mean over all beginnings t, with weights by their profile likelihood, and its variance
+contains the unknown beginning:
+
+    p_t ~ exp(w_t^2 / 2),   size = sum p_t size_t,   u^2 = sum p_t (sd_t^2 + (size_t - size)^2).
+
+The refined beginnings do not enter the alarm, so that its limit needs no further draws.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tankcal.products.upkeep.clocks import OFFSET_STEP_S
 from tankcal.products.upkeep.filtering import (
     FilterState,
     add_rows,
@@ -38,6 +47,9 @@ LEAST_DAYS = 2.0  # of data after a beginning, before a cause is tested
 DRAWS, SEED = 600, 20250106
 OVERLAP_S = 91 * DAY_S  # of a window with the period before
 MOST_JUMPS = 20  # steps with the largest innovations, in which a jump is tested
+MOST_SUSPECTS = 8  # of which the beginnings are refined
+UNLIKELY = 12.0  # less in w^2 than the best beginning: a weight of 0.0025
+MOST_BEGINNINGS = 150  # refined beginnings of a suspect
 SIR_SD = 3.29  # probability of detection 95 % at 5 % of false alarms: 2 x 1.645 sd
 
 
@@ -52,9 +64,11 @@ class Suspect:
         Meter.
     unit : str
     start_s : float
-        Beginning, seconds after the first mark.
-    size, sd, w : float
-        By all steps.
+        Most likely beginning, seconds after the first mark.
+    size, sd : float
+        Estimate and its standard uncertainty by all steps; with the unknown beginning if refined.
+    w : float
+        Of the most likely beginning.
     """
 
     kind: str
@@ -142,6 +156,30 @@ def watch(estimation, false_alarm_per_year=0.05, state=NO_STATE):
     )  # fmt: skip
 
 
+def suspect_clock(watched, start_s, offset_s):
+    """Make a wrong clock of the levels a possible cause of an alarm, beside all others.
+
+    Levels at the wrong time are read during sales, so that each other cause may only seem to have
+    begun.
+
+    Parameters
+    ----------
+    watched : Watch
+        With an alarm.
+    start_s : float
+        First rows with an offset, seconds after the first mark.
+    offset_s : float
+
+    Returns
+    -------
+    Watch
+    """
+    sd = OFFSET_STEP_S / np.sqrt(12)
+    clock = Suspect("clock", None, "s", max(start_s, 0.0), offset_s, sd, offset_s / sd)
+    return replace(watched, suspects=(clock, *watched.suspects), names=(clock, *watched.names),
+                   is_named=False)  # fmt: skip
+
+
 def _watch_window(estimation, begin, first, last, rate):
     """`Watch` of causes that began in the steps begin to last - 1 of the period from `first` on."""
     seconds = np.append(0.0, np.cumsum(estimation.steps.seconds[:last]))
@@ -158,18 +196,25 @@ def _watch_window(estimation, begin, first, last, rate):
     rows = whiten_steps(drift, data, white).rows
     robust, end = estimation.innovations[begin:last], seconds[begin + 1 :]
     jumps = _find_jumps(robust, total_innovations(rows, is_used, upper=upper)[:, 0])
-    kinds, columns = _columns(estimation.steps, balance.level_m[begin : last + 1], drift,
-                              estimation.steps.delivered_m3[begin:last], seconds[begin:],
-                              jumps)  # fmt: skip
-    start = white and FilterState(np.zeros((len(white.mean), columns.shape[1])), white.covariance)
-    both = total_innovations(rows, is_used, whiten_steps(drift, columns, start).rows, upper=upper)
+    causes = _list_causes(estimation.steps, balance.level_m[begin : last + 1], drift,
+                          estimation.steps.delivered_m3[begin:last])  # fmt: skip
+
+    def find_effects(trials):
+        """Innovations (n, 1 + q) of the misclosures, and of causes with their beginnings."""
+        columns = np.stack([cause.column(seconds[begin:], at) for cause, at in trials], axis=1)
+        start = white and FilterState(np.zeros((len(white.mean), len(trials))), white.covariance)
+        effects = whiten_steps(drift, columns, start).rows
+        return total_innovations(rows, is_used, effects, upper=upper)
+
+    trials = _list_trials(causes, seconds[begin:], jumps)
+    both = find_effects(trials)
     innovations, effects = both[:, 0], both[:, 1:]
     day = np.floor(end / DAY_S).astype(int)
     edges = np.flatnonzero(np.append(day[1:] != day[:-1], True)) + 1
     days = max((seconds[-1] - seconds[first]) / DAY_S, 1.0)
     information = _sums(effects**2, edges)
-    starts = np.array([start for _, _, _, start in kinds])
-    waits = np.where([kind in JUMPS for kind, *_ in kinds], -1.0, LEAST_DAYS * DAY_S)
+    starts = np.array([at for _, at in trials])
+    waits = np.where([cause.kind in JUMPS for cause, _ in trials], -1.0, LEAST_DAYS * DAY_S)
     is_tested = (end[edges - 1][:, None] > starts + waits) & (
         information > 1e-6 * np.max(information, initial=1e-300)
     )
@@ -197,9 +242,10 @@ def _watch_window(estimation, begin, first, last, rate):
         limit = PROVISIONAL * limit
     alarms = np.flatnonzero(size_of > limit)
     alarm_s = float(end[edges[alarms[0]] - 1]) if len(alarms) else None
-    suspects = _suspects(kinds, w[-1], root[-1])
+    suspects = _find_suspects(trials, w[-1], root[-1])
     names, is_named = (), False
     if alarm_s is not None:
+        suspects = _refine_beginnings(suspects, trials, w[-1], seconds[begin:], find_effects)
         best = suspects[0].w ** 2
         names = tuple(cause for cause in suspects if best - cause.w**2 < ALIKE)
         is_named = len(names) == 1 and seconds[-1] - alarm_s >= NAMED_AFTER_DAYS * DAY_S
@@ -214,46 +260,68 @@ def _find_jumps(robust, innovations):
     return np.sort(np.argsort(-size)[:MOST_JUMPS])
 
 
-def _columns(steps, level_m, drift, delivered_m3, seconds, jumps):
-    """([(kind, member, unit, start)], columns (n, q)) of every kind and beginning."""
-    metered, end = drift.metered_m3, seconds[1:]
-    starts = np.arange(seconds[0], max(end[-1] - LEAST_DAYS * DAY_S, seconds[0] + 1.0),
-                       STARTS_DAYS * DAY_S)  # fmt: skip
-    # A cause that changes a level or a temperature acts on the increase of the stock.
-    constant = [
-        ("leak", None, "L/h", drift.seconds / 3.6e6),
-        ("throughput", None, "%", metered.sum(axis=1) / 100),
+@dataclass(frozen=True)
+class Cause:
+    """Cause that can begin at any mark.
+
+    Attributes
+    ----------
+    kind, member, unit : str or None
+    unit_m3 : ndarray
+        Effect of a unit on each step, shape (n,), or on the stock at each mark, shape (n + 1,).
+    """
+
+    kind: str
+    member: str | None
+    unit: str
+    unit_m3: np.ndarray
+
+    def column(self, seconds, start_s):
+        """Effect (n,) of a unit from `start_s` on; `seconds` (n + 1,) are the times of the marks.
+
+        A single volume belongs to the step that ends at `start_s`.
+        """
+        if self.kind == "batch":
+            return np.where(seconds[1:] == start_s, self.unit_m3, 0.0)
+        if len(self.unit_m3) == len(seconds):
+            return np.diff(np.where(seconds >= start_s, self.unit_m3, 0.0))
+        return np.where(seconds[:-1] >= start_s, self.unit_m3, 0.0)
+
+
+def _list_causes(steps, level_m, drift, delivered_m3):
+    """`Cause` of every kind and member."""
+    metered = drift.metered_m3
+    causes = [
+        Cause("leak", None, "L/h", drift.seconds / 3.6e6),
+        Cause("throughput", None, "%", metered.sum(axis=1) / 100),
     ]
     if len(steps.meters) > 1:
-        constant += [("meter", name, "%", metered[:, place] / 100)
-                     for place, name in enumerate(steps.meters)]  # fmt: skip
-    if np.any(delivered_m3):
-        constant.append(("ticket", None, "%", -delivered_m3 / 100))
-    at_marks = [
-        ("gauge_scale", None, "mm/m", -drift.area_m2 * level_m / 1000),
-        ("temperature", None, "K", drift.by_degree_m3),
+        causes += [Cause("meter", name, "%", metered[:, place] / 100)
+                   for place, name in enumerate(steps.meters)]  # fmt: skip
+    # A cause that changes a level or a temperature acts on the increase of the stock.
+    return [
+        *causes,
+        Cause("ticket", None, "%", -delivered_m3 / 100),
+        Cause("gauge_scale", None, "mm/m", -drift.area_m2 * level_m / 1000),
+        Cause("temperature", None, "K", drift.by_degree_m3),
+        Cause("zero", None, "mm", -drift.area_m2 / 1000),
+        Cause("batch", None, "L", np.full(len(drift), 1e-3)),
     ]
-    kinds, columns = [], []
-    start_of_step = end - drift.seconds
+
+
+def _list_trials(causes, seconds, jumps):
+    """[(`Cause`, beginning)] of the search: weekly, and in the steps `jumps`."""
+    starts = np.arange(seconds[0], max(seconds[-1] - LEAST_DAYS * DAY_S, seconds[0] + 1.0),
+                       STARTS_DAYS * DAY_S)  # fmt: skip
+    trials = []
     for start in starts:
-        begun = start_of_step >= start
-        for kind, member, unit, column in constant:
-            if np.any(column[begun]):
-                kinds.append((kind, member, unit, start))
-                columns.append(np.where(begun, column, 0.0))
-        marks_begun = seconds > start
-        for kind, member, unit, stock in at_marks:
+        for cause in causes:
             # A change at the first mark is no change: it is the prior's cause itself.
-            if start > seconds[0] and np.any(stock):
-                kinds.append((kind, member, unit, start))
-                columns.append(np.diff(np.where(marks_begun, stock, 0.0)))
-    stock = -drift.area_m2 / 1000
-    for step in jumps:
-        kinds += [("zero", None, "mm", end[step]), ("batch", None, "L", end[step])]
-        marks_begun = np.arange(len(stock)) > step
-        columns.append(np.diff(np.where(marks_begun, stock, 0.0)))
-        columns.append(np.where(np.arange(len(end)) == step, 1e-3, 0.0))
-    return kinds, np.stack(columns, axis=1)
+            is_late = start > seconds[0] or len(cause.unit_m3) < len(seconds)
+            if cause.kind not in JUMPS and is_late and np.any(cause.column(seconds, start)):
+                trials.append((cause, float(start)))
+    return trials + [(cause, float(seconds[step + 1])) for step in jumps for cause in causes
+                     if cause.kind in JUMPS]  # fmt: skip
 
 
 def _sums(values, edges):
@@ -293,14 +361,50 @@ def _draw_blocks(pool, seconds, count, rng, draws):
     return drawn.reshape(draws, -1)[:, :count]
 
 
-def _suspects(kinds, w, root):
+def _find_suspects(trials, w, root):
     """Best beginning of each kind and member, the most likely first."""
     best = {}
-    for place, (kind, member, unit, start) in enumerate(kinds):
+    for place, (cause, at) in enumerate(trials):
         if np.isfinite(root[place]):
-            suspect = Suspect(kind, member, unit, float(start), float(w[place] / root[place]),
-                              float(1 / root[place]), float(w[place]))  # fmt: skip
-            known = best.get((kind, member))
+            suspect = Suspect(cause.kind, cause.member, cause.unit, at,
+                              float(w[place] / root[place]), float(1 / root[place]),
+                              float(w[place]))  # fmt: skip
+            known = best.get((cause.kind, cause.member))
             if known is None or abs(suspect.w) > abs(known.w):
-                best[kind, member] = suspect
-    return tuple(sorted(best.values(), key=lambda suspect: -abs(suspect.w)))
+                best[cause.kind, cause.member] = suspect
+    return _sort_suspects(best.values())
+
+
+def _sort_suspects(suspects):
+    """Suspects, the most likely first."""
+    return tuple(sorted(suspects, key=lambda suspect: -abs(suspect.w)))
+
+
+def _refine_beginnings(suspects, trials, w, seconds, find_effects):
+    """Suspects with beginnings at any mark, and the unknown beginning in their uncertainty."""
+    refined, week = list(suspects), STARTS_DAYS * DAY_S
+    for place, suspect in enumerate(suspects[:MOST_SUSPECTS]):
+        if suspect.kind == "batch":
+            continue
+        same = [number for number, (cause, _) in enumerate(trials)
+               if (cause.kind, cause.member) == (suspect.kind, suspect.member)]  # fmt: skip
+        cause, squares = trials[same[0]][0], w[same] ** 2
+        near = np.array([trials[number][1] for number in same])[squares > squares.max() - UNLIKELY]
+        last = seconds[-1] - (0 if cause.kind in JUMPS else LEAST_DAYS * DAY_S)
+        is_near = (seconds > near.min() - week) & (seconds < near.max() + week)
+        starts = seconds[is_near & (seconds > seconds[0]) & (seconds <= last)]
+        starts = starts[:: len(starts) // MOST_BEGINNINGS + 1]
+        both = find_effects([(cause, start) for start in starts])
+        information = np.sum(both[:, 1:] ** 2, axis=0)
+        is_determined = information > 0
+        starts, information = starts[is_determined], information[is_determined]
+        sizes = (both[:, 0] @ both[:, 1:])[is_determined] / information
+        w_at = sizes * np.sqrt(information)
+        best = int(np.argmax(np.abs(w_at)))
+        weights = np.exp((w_at**2 - w_at[best] ** 2) / 2)
+        weights /= weights.sum()
+        size = float(weights @ sizes)
+        sd = float(np.sqrt(weights @ (1 / information + (sizes - size) ** 2)))
+        refined[place] = replace(suspect, start_s=float(starts[best]), size=size, sd=sd,
+                                 w=float(w_at[best]))  # fmt: skip
+    return _sort_suspects(refined)
