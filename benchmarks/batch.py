@@ -1,6 +1,8 @@
 """Many jobs: what a batch costs, step by step, and how many bytes a job takes in its memory.
 
-    python benchmarks/batch.py [JOBS] [--workers N] [--papers] [--empty ROWS] [--keep DIR]
+    python benchmarks/batch.py [JOBS] [--workers N] [--papers] [--keep DIR]
+    python benchmarks/batch.py [JOBS] --settled
+    python benchmarks/batch.py [JOBS] --sleep SECONDS [--workers N]
 
 JOBS tanks (1000) are made of the shipped examples of strapping and of points, in turn: their
 readings are scaled by a few parts in 10 000 and get noise of 0.3 mm, so that no two are alike. They
@@ -9,15 +11,16 @@ the workers note in the journal; of the rest of their processes (imports, dask) 
 that hands the jobs out, what the system counts. Then the batch is run once more, where all is
 settled already.
 
---empty: no job is computed; so many tasks that do nothing go through the same loop, and the growth
-of memory is printed.
+--settled: two jobs are computed, and linked JOBS times; a batch of them is run that has nothing to
+compute: search, digests, outcomes and summary alone.
+
+--sleep: workers sleep instead of computing; processor and memory of scheduler and loop are printed.
 """
 
 import argparse
 import csv
 import json
 import os
-import resource
 import shutil
 import subprocess
 import sys
@@ -25,6 +28,8 @@ import tempfile
 import threading
 import time
 from collections import Counter
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -137,12 +142,59 @@ def measure(count, workers, papers, keep):
               f"processor, {1000 * processor / count:.1f} ms a job, {held:.0f} MB")  # fmt: skip
 
 
-def nothing(task):
-    """What a worker does with a task that is none."""
+def measure_settled(count):
+    """Print what a batch costs that has nothing to compute."""
+    from tankcal.products.batch.finding import BatchJob
+    from tankcal.products.batch.journal import compute_keys
+    from tankcal.products.batch.options import Options
+    from tankcal.products.batch.outcomes import load_outcome, save_outcome
+
+    with tempfile.TemporaryDirectory() as folder:
+        jobs, out, links = (Path(folder) / name for name in ("jobs", "out", "links"))
+        write_jobs(jobs, len(WANTED))
+        run(jobs, out, 0, papers=False)
+        options, known = Options(papers=False), {}
+        for number in range(count):
+            source = jobs / f"T-{number % len(WANTED):04d}"
+            name, target = f"T-{number:06d}", links / f"T-{number:06d}"
+            link(source, target)
+            link(
+                out / "jobs" / source.name / "results",
+                Path(folder) / "done" / "jobs" / name / "results",
+            )
+            known.setdefault(source, load_outcome(out, source.name))
+            keys = compute_keys(BatchJob(name, name, str(target), options))
+            step = replace(known[source].steps["run"], key=keys["run"])
+            save_outcome(Path(folder) / "done", replace(
+                known[source], name=name, source=str(target), steps={"run": step}))  # fmt: skip
+        (Path(folder) / "done" / "journal.jsonl").touch()
+        clock, processor, held = run(links, Path(folder) / "done", 0, papers=False)
+        sizes = {file.name: file.stat().st_size / 1e6
+                 for file in sorted((Path(folder) / "done").glob("summary.*"))}  # fmt: skip
+        print(f"{count} settled jobs: {clock:.1f} s by the clock, {processor:.1f} s of processor, "
+              f"{1000 * processor / count:.1f} ms a job, {held:.0f} MB; "
+              + ", ".join(f"{name} {size:.1f} MB" for name, size in sizes.items()))  # fmt: skip
+
+
+def link(source, target):
+    """A folder whose files are links to those of another; copies where a file has too many."""
+    target.mkdir(parents=True)
+    for file in source.iterdir():
+        try:
+            os.link(file, target / file.name)
+        except OSError:
+            shutil.copy(file, target / "new")
+            (target / "new").replace(file)
+            os.link(file, target / file.name)
+
+
+def sleep(seconds, task):
+    """What a simulated worker does with a task."""
+    time.sleep(seconds)
     return "done", [], 0
 
 
-def measure_empty(rows, workers):
+def measure_sleeping(rows, workers, seconds):
     """Print what the loop itself costs, and how its memory grows."""
     from tankcal.pipeline.cluster import open_client
     from tankcal.products.batch import running
@@ -162,23 +214,17 @@ def measure_empty(rows, workers):
                 BatchJob(name, name, f"/site/{name}", options), {"run": "0" * 64}, "/out", "r"
             )
 
-    running.do_job = nothing
+    running.do_job = partial(sleep, seconds)
     with tempfile.TemporaryDirectory() as out, open_folder(out) as journal, \
             open_client(workers) as client:  # fmt: skip
-        before = resource.getrusage(resource.RUSAGE_SELF)
-        running._ByWorkers(client, journal, lambda *row: None).do(tasks())
-        after = resource.getrusage(resource.RUSAGE_SELF)
+        before, start = time.process_time(), time.perf_counter()
+        running._WorkerRuns(client, journal, lambda *row: None).do(tasks())
+        spent, clock = time.process_time() - before, time.perf_counter() - start
     held.append(megabytes(os.getpid()))
-    spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    print(f"{rows} empty tasks: {spent:.1f} s of processor of scheduler and loop, "
-          f"{1000 * spent / rows:.2f} ms a task; MB held: "
+    print(f"{rows} tasks of {seconds:g} s, {workers} workers: {clock:.1f} s by the clock, "
+          f"{100 * rows * seconds / workers / clock:.0f} % of them asleep; scheduler and loop "
+          f"{1000 * spent / rows:.2f} ms of processor a task; MB held: "
           + ", ".join(f"{one:.0f}" for one in held))  # fmt: skip
-    bytes_each = (held[-1] - held[1]) * 1024**2 / (rows * 4 / 5)
-    print(f"  growth over the last four fifths: {bytes_each:.0f} bytes a task")
-    before = megabytes(os.getpid())
-    listed = list(tasks())
-    size = (megabytes(os.getpid()) - before) * 1024**2 / rows
-    print(f"  a waiting task: {size:.0f} bytes ({len(listed)})")
 
 
 if __name__ == "__main__":
@@ -186,10 +232,13 @@ if __name__ == "__main__":
     parser.add_argument("jobs", nargs="?", type=int, default=1000)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--papers", action="store_true")
-    parser.add_argument("--empty", type=int)
+    parser.add_argument("--settled", action="store_true")
+    parser.add_argument("--sleep", type=float)
     parser.add_argument("--keep", metavar="DIR")
     given = parser.parse_args()
-    if given.empty:
-        measure_empty(given.empty, given.workers)
+    if given.settled:
+        measure_settled(given.jobs)
+    elif given.sleep is not None:
+        measure_sleeping(given.jobs, given.workers, given.sleep)
     else:
         measure(given.jobs, given.workers, given.papers, given.keep)

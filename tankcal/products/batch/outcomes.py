@@ -97,8 +97,12 @@ def job_folder(out, name):
     return Path(out) / JOBS / name
 
 
-def load_outcome(out, name):
-    """Return the `Outcome` in the folder of a job; None if it is missing or invalid."""
+def load_outcome(out, name, is_verified=True):
+    """Return the `Outcome` in the folder of a job; None if it is missing or invalid.
+
+    Steps without all of their files are left out; with `is_verified` also steps whose files have
+    other digests than SHA256SUMS. That reads all results, so a batch does it once per job.
+    """
     folder = job_folder(out, name)
     try:
         saved = json.loads((folder / FILE).read_bytes())
@@ -112,24 +116,25 @@ def load_outcome(out, name):
         valid = {
             step: outcome
             for step, outcome in steps.items()
-            if _is_step(outcome) and _has_its_files(folder, step, outcome)
+            if _is_step(outcome) and _has_its_files(folder / FOLDERS[step], outcome, is_verified)
         }
         return Outcome(saved["name"], saved["source"], valid)
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return None
 
 
-def _has_its_files(folder, step, outcome):
-    """Return whether all files of a step still exist with the digests of SHA256SUMS."""
-    if not outcome.files:
+def _has_its_files(place, outcome, is_verified):
+    """Return whether all files of a step exist, with the digests of SHA256SUMS if `is_verified`."""
+    if not all((place / name).is_file() for name in outcome.files):
+        return False
+    if not (outcome.files and is_verified):
         return True
-    place = folder / FOLDERS[step]
     try:
         listed = manifest.read_manifest(place)
     except InputError:
         return False
     return listed is not None and all(
-        (place / name).is_file() and listed.digests.get(name) == manifest.digest_of(place / name)
+        listed.digests.get(name) == manifest.digest_of(place / name)
         for name in outcome.files
         if name != manifest.FILE
     )
@@ -163,7 +168,7 @@ def read_known_names(out):
     except OSError:
         return names
     for name in folder_names:
-        outcome = load_outcome(out, name)
+        outcome = load_outcome(out, name, is_verified=False)
         if outcome is not None and outcome.name == name:
             names[outcome.source] = name
     return names

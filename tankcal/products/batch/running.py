@@ -354,7 +354,7 @@ def _former_rows(path):
 
 def _row(out, job):
     """Return the summary row of a job, from its outcome only."""
-    outcome, steps = load_outcome(out, job.name), job.options.steps
+    outcome, steps = load_outcome(out, job.name, is_verified=False), job.options.steps
     row = {"name": job.name, "source": job.source, "status": "failed", **dict.fromkeys(VALUES)}
     problems, warnings, papers, counts = [], [], [], [0, 0]
     for step in () if outcome is None else steps:
