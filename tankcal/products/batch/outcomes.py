@@ -141,7 +141,7 @@ def _has_its_files(place, outcome, is_verified):
 
 
 def save_outcome(out, outcome):
-    """Write an outcome to the folder of its job, all or nothing."""
+    """Write an outcome to the folder of its job, all of it or none."""
     steps = {step: asdict(outcome.steps[step]) for step in STEPS if step in outcome.steps}
     saved = {"format": FORMAT, "name": outcome.name, "source": outcome.source, "steps": steps}
     folder = job_folder(out, outcome.name)

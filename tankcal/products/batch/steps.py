@@ -183,7 +183,7 @@ def _make_failure(key, status, problems):
     return StepOutcome(key, status, problems=plain_problems, problem_count=len(problems))
 
 
-# ---- steps: each writes its folder, all or nothing, and returns the paths
+# ---- steps: each writes its folder, complete or not, and returns the paths
 
 
 def _run(task, clock):

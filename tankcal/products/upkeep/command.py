@@ -1,5 +1,6 @@
 """`tankcal upkeep`: a calibration kept up by everyday data."""
 
+import os
 from pathlib import Path
 
 from tankcal.messages import message
@@ -33,6 +34,14 @@ def add(commands):
     upkeep.add_argument("folder", metavar="DIR", help="folder with upkeep.toml and the logs")
     upkeep.add_argument(
         "--new", action="store_true", help="create the folder with empty input files to fill in"
+    )
+    upkeep.add_argument(
+        "--from",
+        dest="source",
+        metavar="SOURCE",
+        help="begin with a record.json or its folder, a capacity table of another laboratory (CSV, "
+        "workbook, PDF, former.toml), a job such as the sizes of a drawing, or with 'nothing': the "
+        "table of a horizontal tank from its sales and [drawing] (default: record in upkeep.toml)",
     )
     upkeep.add_argument(
         "--out",
@@ -78,7 +87,7 @@ def _upkeep(options):
     show = Progress(options.quiet or options.machine)
     show.step(message("upkeep_reading", "reading the logs"))
     state = State(options.state)
-    inputs = read_upkeep(options.folder, state)
+    inputs = read_upkeep(options.folder, state, _find_source(options))
     if options.language is None and inputs.sections["upkeep"]["language"] is not None:
         speak(inputs.sections["upkeep"]["language"])
     show.step(message("upkeep_estimating", "estimating the tank"))
@@ -95,6 +104,17 @@ def _upkeep(options):
         )
     show.end()
     print_saved(options, upkeep, _tell, written)
+
+
+def _find_source(options):
+    """Text of --from, as seen from the folder of upkeep.toml."""
+    from tankcal.products.upkeep.start import WITHOUT_TABLE
+
+    if options.source in (None, WITHOUT_TABLE):
+        return options.source
+    folder = Path(options.folder)
+    folder = folder.parent if folder.suffix == ".toml" else folder
+    return Path(os.path.relpath(options.source, folder)).as_posix()
 
 
 def _tell(upkeep):

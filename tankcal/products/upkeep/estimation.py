@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-import scipy.stats
+from scipy.special import gammaincc
 
 from tankcal.products.upkeep.causes import Balance
 from tankcal.products.upkeep.filtering import (
@@ -82,7 +82,7 @@ class Estimation:
     @property
     def probability(self):
         """Probability of a larger chi-square, if the model is right."""
-        return float(scipy.stats.chi2.sf(self.triangle.chi2, max(self.triangle.count, 1)))
+        return float(gammaincc(max(self.triangle.count, 1) / 2, self.triangle.chi2 / 2))
 
     def sizes(self):
         """Estimates and standard uncertainties of the causes in their units, each (c,)."""

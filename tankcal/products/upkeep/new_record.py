@@ -209,5 +209,6 @@ def compute_record_again(record, folder):
     -------
     record.recomputation.Recomputation
     """
-    inputs = read_upkeep(folder)
+    source = record["files"][1]["file"]  # the first file is upkeep.toml
+    inputs = read_upkeep(folder, source=source)
     return compare_records(record, make_record(inputs, keep_up(inputs)))

@@ -2,13 +2,10 @@
 
 from typing import ClassVar
 
-from matplotlib.figure import Figure
-
 from tankcal.messages import message
 from tankcal.products.upkeep.saved import UPKEEP
 from tankcal.report import blocks
 from tankcal.report.plain import words_with_part
-from tankcal.report.plots.style import GREY, INK, RED, WIDTH, styled
 from tankcal.report.saved_document import SavedDocument, SavedPaper, bearable
 from tankcal.report.tables import Column, Table
 from tankcal.text.digits import format_with_u, shortest
@@ -21,6 +18,7 @@ FILE, WORKBOOK = "upkeep.json", "upkeep.xlsx"
 DIGEST = 12  # printed digits of a SHA-256
 ROWS_SHOWN = 24  # rows of the table in the report
 LABELS_SHOWN = 7  # months named below the figure
+SIZE_NAMES = ("diameter", "length", "end_depth", "tilt", "zero")  # of a tank without calibration
 SMALLEST_W = 2.5  # |w| of a printed suspect, unless it is possible
 
 
@@ -120,6 +118,27 @@ CLEANING = Table(
     ),
     rows=lambda upkeep: [row for row in (*upkeep["cleaning"], *upkeep["left_out"]) if row["count"]],
 )
+SIZES = Table(
+    "upkeep_sizes",
+    (
+        _plain("solution", 0),
+        _plain("chi2", 1),
+        Column("name", words="sizes", csv="name", sheet=True, width=22),
+        _text("unit", 8),
+        _plain("mean", 1),
+        _plain("prior_u", 1),
+        _number("estimate", "u"),
+        _number("u", "u"),
+        *(_plain(f"r_{name}", 2) for name in SIZE_NAMES),
+    ),
+    rows=lambda upkeep: [
+        size | {"solution": number, "chi2": solution["chi2"]}
+        | {f"r_{name}": None for name in SIZE_NAMES}
+        | {f"r_{other['name']}": r for other, r in zip(solution["sizes"], values, strict=True)}
+        for number, solution in enumerate(upkeep["start"]["solutions"], 1)
+        for size, values in zip(solution["sizes"], solution["correlation"], strict=True)
+    ],
+)  # fmt: skip
 CAUSES = Table(
     "upkeep_causes",
     (
@@ -135,6 +154,7 @@ CAUSES = Table(
 FILES = {
     "table.csv": ROWS, "deliveries.csv": DELIVERIES, "meters.csv": METERS, "months.csv": MONTHS,
     "alarms.csv": SUSPECTS, "cleaning.csv": CLEANING, "causes.csv": CAUSES,
+    "sizes.csv": SIZES,
 }  # fmt: skip
 
 
@@ -174,9 +194,11 @@ class UpkeepPaper(SavedPaper):
 
     def result(self):
         """Sentence of the main result: the delivery over the levels of the steps."""
-        last = self.record["deliveries"][-1]
+        last, code = self.record["deliveries"][-1], self.record["mode"]
+        if self.record["start"]["kind"] == "sales":
+            code = {"deliveries": "sales", "watched": "drawing"}[code]
         return self.word(
-            f"texts.result_{self.record['mode']}",
+            f"texts.result_{code}",
             low=self.height(round(last["low_m"], 3)), high=self.height(round(last["high_m"], 3)),
             volume=self.with_u(last["volume_m3"], last["U_m3"], "m³"),
             former=self.with_u(last["former_m3"], last["former_U_m3"], "m³"),
@@ -184,8 +206,10 @@ class UpkeepPaper(SavedPaper):
         )  # fmt: skip
 
     def reasons(self):
-        """Reasons why results are not stated."""
-        return [self.words["reasons"][reason] for reason in self.record["reasons"]]
+        """Reasons why results are not stated, and the number of solutions."""
+        count = len(self.record["start"]["solutions"])
+        texts = [self.words["reasons"][reason] for reason in self.record["reasons"]]
+        return texts + ([self.word("texts.solutions", count=count)] if count > 1 else [])
 
     def alarm(self):
         """Sentence of the watching."""
@@ -217,7 +241,7 @@ def pages(paper, folder=None, whole=False):
         *paper.head(folder),
         paper.facts(_facts(paper)),
         blocks.paragraph(paper.result()),
-        *([blocks.listing(paper.reasons())] if upkeep["reasons"] else []),
+        *([blocks.listing(paper.reasons())] if paper.reasons() else []),
         blocks.paragraph(paper.alarm()),
         paper.show(DELIVERIES),
         blocks.whole(paper.show(METERS)),
@@ -225,6 +249,7 @@ def pages(paper, folder=None, whole=False):
         paper.figure(plot_months(paper), "upkeep_leak"),
         paper.show(MONTHS),
         *([paper.show(SUSPECTS)] if SUSPECTS.rows(upkeep) else []),
+        *([paper.show(SIZES)] if SIZES.rows(upkeep) else []),
         *([_table(paper)] if upkeep["rows"] else []),
         paper.show(CLEANING),
         paper.heading("remarks"),
@@ -270,22 +295,29 @@ def _remarks(paper):
     return texts
 
 
-@styled
 def plot_months(paper):
     """Draw the leak rate of each month with U (matplotlib Figure)."""
-    months = paper.record["months"]
-    figure = Figure(figsize=(WIDTH, 1.9))
-    ax = figure.add_subplot()
-    places = range(len(months))
-    for place, month in zip(places, months, strict=True):
-        colour = RED if month["verdict"] == "fail" else INK
-        ax.errorbar(place, month["leak_l_h"], yerr=month["U_l_h"], color=colour, marker="o",
-                    markersize=3, capsize=2, linewidth=0.9)  # fmt: skip
-    ax.axhline(0, color=GREY, linewidth=0.7)
-    step = -(-len(months) // LABELS_SHOWN)
-    ax.set_xticks(list(places)[::step], [month["month"] for month in months][::step])
-    ax.set_ylabel(paper.word("texts.leak_axis"))
-    return figure
+    # A month without papers loads no plots.
+    from matplotlib.figure import Figure
+
+    from tankcal.report.plots.style import GREY, INK, RED, WIDTH, styled
+
+    @styled
+    def draw():
+        figure = Figure(figsize=(WIDTH, 1.9))
+        ax, months = figure.add_subplot(), paper.record["months"]
+        for place, month in enumerate(months):
+            colour = RED if month["verdict"] == "fail" else INK
+            ax.errorbar(place, month["leak_l_h"], yerr=month["U_l_h"], color=colour, marker="o",
+                        markersize=3, capsize=2, linewidth=0.9)  # fmt: skip
+        ax.axhline(0, color=GREY, linewidth=0.7)
+        step = -(-len(months) // LABELS_SHOWN)
+        places = range(0, len(months), step)
+        ax.set_xticks(list(places), [months[place]["month"] for place in places])
+        ax.set_ylabel(paper.word("texts.leak_axis"))
+        return figure
+
+    return draw()
 
 
 def write_workbook(paper, path):
@@ -313,7 +345,7 @@ def _sheets(book):
         Sentences(_remarks(paper), title=paper.words["headings"]["remarks"]),
     ]
     yield SheetContent("upkeep_result", parts, landscape=False, widths=(42, 58))
-    for table in (ROWS, DELIVERIES, METERS, MONTHS, SUSPECTS, CLEANING, CAUSES):
+    for table in (ROWS, DELIVERIES, METERS, MONTHS, SUSPECTS, CLEANING, CAUSES, SIZES):
         if table.rows(paper.record):
             yield SheetContent(table.name, [cell_table(book, table)], tab="result")
 

@@ -26,6 +26,14 @@ from tankcal.products.upkeep.flows import quiet_windows, read_flows
 from tankcal.products.upkeep.levels import MOST_OFFSET_S, LevelSums
 from tankcal.products.upkeep.logs import Findings, LogFile
 from tankcal.products.upkeep.profiles import read_log_profile
+from tankcal.products.upkeep.start import (
+    DRAWING,
+    SALES,
+    WITHOUT_TABLE,
+    LyingStock,
+    check_drawing,
+    open_start,
+)
 from tankcal.products.upkeep.state import NO_STATE
 from tankcal.products.upkeep.steps import REASONS, StepRules, Tickets, build_steps
 from tankcal.record.manifest import digest_of
@@ -61,7 +69,7 @@ def _files(kind):
 
 SECTIONS = {
     "upkeep": (
-        Field("record", "text", "record.json of the tank, or its folder", required=True),
+        Field("record", "text", "record.json of the tank, a table or a job"),
         Field("timezone", "text", "IANA name of local times", required=True),
         choice("service", "", tuple(SERVICES), required=True),
         choice("language", "", LANGUAGES),
@@ -80,6 +88,7 @@ SECTIONS = {
         positive("rest_h", "after a delivery", 200),
         positive("least_delivery_m3", "", 1e4),
     ),
+    "drawing": DRAWING,
     **{kind: _files(kind) for kind in ("levels", "meters", "deliveries", "events", "air")},
     "priors": tuple(number(name, "", 0, 1e6) for name in PRIORS["station"]),
     "watch": (number("false_alarm_per_year", "", 0.001, 1.0),),
@@ -125,8 +134,10 @@ class Inputs:
     warnings : tuple of Problem
     folder : Path
         Folder of upkeep.toml, from which the names of the files lead.
-    record_path : Path
-        Record of the table in force.
+    record_path : Path or None
+        Record of the table in force; None: no calibration.
+    start : str
+        A value of saved.STARTS.
     former_upkeep : dict or None
         Everyday data that this table contains already.
     clock : tuple of (int, float) or None
@@ -141,9 +152,11 @@ class Inputs:
     pieces: int
     traceable: dict
     warnings: tuple
-    folder: Path
-    record_path: Path
-    former_upkeep: dict | None
+    folder: Path = None
+    record_path: Path | None = None
+    former_upkeep: dict | None = None
+    start: str = SALES
+    holder: object = None  # keeps the folder of a computed record
     clock: tuple | None = None
 
     def files(self):
@@ -183,10 +196,10 @@ def find_record(folder):
     except (OSError, ValueError, LookupError, TypeError):
         return None  # `read_upkeep` reports it
     path = path / "record.json" if path.is_dir() else path
-    return path if path.is_file() else None
+    return path if path.is_file() and path.suffix == ".json" else None
 
 
-def read_upkeep(folder, state=NO_STATE):
+def read_upkeep(folder, state=NO_STATE, source=None):
     """Read the settings and all logs of a tank, clean them and build its steps.
 
     Parameters
@@ -195,6 +208,9 @@ def read_upkeep(folder, state=NO_STATE):
         Folder with upkeep.toml, or its upkeep.toml.
     state : state.State, optional
         Results of earlier runs; sums of known files are taken from there.
+    source : str, optional
+        In place of `record` of upkeep.toml, from the folder on: a record, a table of another
+        laboratory, a job, or WITHOUT_TABLE.
 
     Returns
     -------
@@ -229,38 +245,62 @@ def read_upkeep(folder, state=NO_STATE):
             tell(f"{kind}.files", message("upkeep_no_files", "missing; expected the files of the "
                  "log"))  # fmt: skip
     log.stop_if_problems()
-    path = folder / sections["upkeep"]["record"]
-    path = path / "record.json" if path.is_dir() else path
-    if not path.is_file():
-        tell("upkeep.record", message("upkeep_no_record", "found {name}, where no record is; "
-             "expected record.json of the tank, or its folder",
-             name=shown(sections["upkeep"]["record"])))  # fmt: skip
+    start = _open_source(source, folder, sections, tell)
     log.stop_if_problems()
-    table = read_table(path)
-    findings, sources = Findings(), [
-        LogSource("settings", settings.name, digest_of(settings)),
-        LogSource("record", Path(os.path.relpath(path, folder)).as_posix(), table.digest),
-    ]  # fmt: skip
+    findings, sources = Findings(), [LogSource("settings", settings.name, digest_of(settings))]
+    for path in () if start is None else start.files:
+        name = Path(os.path.relpath(path, folder)).as_posix()
+        kind = "record" if path == start.files[0] else "settings"
+        sources.append(LogSource(kind, name, digest_of(path)))
     files = {
         kind: _log_files(kind, sections, folder, zone, findings, log, sources)
         for kind in ("events", "meters", "deliveries", "air", "levels")
     }
     meters = _read_meters(folder, marks, log, sources)
-    former = records.load(path).get("upkeep")
+    former = None if start is None else records.load(start.path).get("upkeep")
     known = {source.sha256: source.file for source in sources if source.kind not in FIXED}
     for digest in sorted(known.keys() & set(former["logs"] if former else ())):
         log.problem(known[digest], message(
             "upkeep_known_log", "the table in force contains this log; expected logs of a later "
             "time: it would count twice"))  # fmt: skip
     log.stop_if_problems()
-    inputs = _build(sections, table, meters, files, findings, sources, log, state)
+    expansion, base = (sections["liquid"][key] for key in ("expansion_per_k", "base_c"))
+    stock = (
+        LyingStock(sections["drawing"], expansion, base)
+        if start is None
+        else TableStock(read_table(start.path), expansion, base)
+    )
+    for text in () if start is None else start.warnings:
+        log.warning(start.files[0].name, text)
+    inputs = _build(sections, stock, meters, files, findings, sources, log, state)
     first = np.datetime64(int(inputs.steps.marks.time_ns[0]), "ns").astype("datetime64[D]")
     if former and first < np.datetime64(former["last"]):
         text = message("upkeep_overlap", "steps from {first} on; the table in force contains data "
                        "until {last}; expected later data: they would count twice",
                        first=str(first), last=former["last"])  # fmt: skip
         raise InputError(Problem(files["levels"][0].path.name, text))
-    return replace(inputs, folder=folder, record_path=path, former_upkeep=former)
+    inputs = replace(inputs, folder=folder, former_upkeep=former)
+    if start is None:
+        return inputs
+    return replace(inputs, record_path=start.path, start=start.kind, holder=start.holder)
+
+
+def _open_source(source, folder, sections, report):
+    """`StartTable` of a source, or of `record` of upkeep.toml; None without a calibration."""
+    source = source or sections["upkeep"]["record"]
+    sections["upkeep"]["record"], start = source, None
+    if source is None:
+        report("upkeep.record", message("upkeep_no_source", "missing; expected record.json of the "
+             "tank, a table, a job, or {word}", word=WITHOUT_TABLE))  # fmt: skip
+    elif source == WITHOUT_TABLE:
+        check_drawing(sections["drawing"], report)
+    else:
+        start = open_start(folder / source)
+        if start is None:
+            report("upkeep.record", message("upkeep_no_record", "found {name}, where no record, "
+                 "table or job is; expected record.json of the tank, a table, or a job folder",
+                 name=shown(source)))  # fmt: skip
+    return start
 
 
 def _log_files(kind, sections, folder, zone, findings, log, sources):
@@ -322,8 +362,9 @@ def _read_meters(folder, marks, log, sources):
     return meters
 
 
-def _build(sections, table, meters, files, findings, sources, log, state):
+def _build(sections, stock, meters, files, findings, sources, log, state):
     """`Inputs` of the opened files."""
+    table = stock.table
     service = sections["upkeep"]["service"]
     rules = fill_blanks(sections["gauge"], SERVICES[service])
     quantum = sections["gauge"]["resolution_mm"] / 1000
@@ -368,8 +409,7 @@ def _build(sections, table, meters, files, findings, sources, log, state):
     _judge_cleaning(findings, files["levels"][0].path.name, log)
     log.stop_if_problems()
     operation = Operation(
-        TableStock(table, sections["liquid"]["expansion_per_k"], sections["liquid"]["base_c"]),
-        {name: meter for name, (meter, _) in meters.items()}, priors, air,
+        stock, {name: meter for name, (meter, _) in meters.items()}, priors, air,
         {kind: bool(sections[kind]["net"]) for kind in ("meters", "deliveries")},
         int(steps.marks.time_ns[0]),
     )  # fmt: skip
@@ -380,7 +420,7 @@ def _build(sections, table, meters, files, findings, sources, log, state):
                         "listed; its factor is taken as 1 with the prior u",
                         name=flow.name))  # fmt: skip
     return Inputs(sections, operation, steps, findings, tuple(sources), len(pieces), traceable,
-                  tuple(log.warnings), None, None, None, clock)  # fmt: skip
+                  tuple(log.warnings), clock=clock)  # fmt: skip
 
 
 def _judge_cleaning(findings, file, log):

@@ -47,7 +47,7 @@ def compute_again(saved, folder):
             file=UPKEEP.file,
         )
         return None, [], [note]
-    again = to_plain(keep_up(read_upkeep(settings)))
+    again = to_plain(keep_up(read_upkeep(settings, source=saved["inputs"]["upkeep"]["record"])))
     return *compare_values(UPKEEP.file, _drop_texts(saved), _drop_texts(again)), []
 
 

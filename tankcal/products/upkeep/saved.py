@@ -12,6 +12,7 @@ UPKEEP = SavedFormat(
     "tankcal-upkeep", 1, "upkeep.json", schemas=Path(__file__).with_name("schemas")
 )
 MODES = ("improved", "deliveries", "watched")
+STARTS = ("record", "table", "job", "drawing", "sales")
 VERDICTS = ("pass", "fail", "inconclusive")
 
 
@@ -88,6 +89,22 @@ class UpkeepCause(Saved):
     u: Finite = key("standard uncertainty after")
 
 
+class UpkeepSolution(Saved):
+    """Sizes of a tank without a calibration, at a minimum of chi-squared."""
+
+    chi2: Finite = key("above the smallest minimum")
+    sizes: list[UpkeepCause] = key("diameter, length, depth of the ends, tilt, zero")
+    correlation: list[list[Finite]] = key("of the sizes")
+
+
+class UpkeepStart(Saved):
+    """Table with which the upkeep began."""
+
+    kind: str = key(", ".join(STARTS))
+    is_stock_control: bool = key("whether the table serves stock control only, without certificate")
+    solutions: list[UpkeepSolution] = key("without a calibration: the smallest chi-squared first")
+
+
 class UpkeepMonth(Saved):
     """Watching of a month."""
 
@@ -161,7 +178,7 @@ class UpkeepFile(Saved, kw_only=True):
     tankcal: str = key("version of tankcal", default_factory=find_version)
     notice: str = key("on every page, such as EXAMPLE", default="")
     tank: str = key("name of the tank")
-    record_sha256: str = key("of the record of the former table")
+    record_sha256: str = key("of the record of the former table, or of the drawing")
     coverage_probability: Finite = key("of all U")
     k: Finite = key("coverage factor of all U")
     site: str | None = key("as declared")
@@ -169,6 +186,7 @@ class UpkeepFile(Saved, kw_only=True):
     note: str | None = key("remark")
     service: str = key('"station" or "terminal"')
     liquid: str | None = key("name of the liquid")
+    start: UpkeepStart = key("table with which the upkeep began")
     mode: str = key(", ".join(MODES))
     reasons: list[str] = key("why the table is not improved, or its contents are not stated")
     period: UpkeepPeriod = key("time and steps")

@@ -6,7 +6,7 @@ from tankcal.products.upkeep.reading import METER_COLUMNS, METERS, SECTIONS, SET
 from tankcal.text.words import load_words
 
 LOGS = ("levels", "meters", "deliveries", "events", "air")
-ASKED = {("levels", "files"), ("meters", "files")}
+ASKED = {("upkeep", "record"), ("levels", "files"), ("meters", "files")}
 
 
 def write_starter(folder, language):

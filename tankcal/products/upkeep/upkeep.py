@@ -15,6 +15,12 @@ from tankcal.products.upkeep import saved
 from tankcal.products.upkeep.estimation import LEAST_RANGE, LEAST_STEPS, estimate
 from tankcal.products.upkeep.filtering import whiten_steps
 from tankcal.products.upkeep.reading import SETTINGS
+from tankcal.products.upkeep.start import (
+    CERTIFIED_RANGE,
+    SALES,
+    STOCK_PROBABILITY,
+    estimate_sizes,
+)
 from tankcal.products.upkeep.state import NO_STATE
 from tankcal.products.upkeep.steps import REASONS
 from tankcal.products.upkeep.watching import SIR_SD, suspect_clock, watch
@@ -27,6 +33,7 @@ SIR_LIMIT_L_H = 0.757  # 0.2 gal/h, the rate of inventory reconciliation (40 CFR
 ONE_SIDED = 1.645  # standard deviations of the 95 % quantile of the usual loss
 WIDE_CHANGE = 1e3  # prior standard deviation of the change of a month, L/h or %
 ROWS_SHOWN = 4  # deliveries between fifths of the seen levels
+_OF_STOCK = {"no_traceable_meter": "stock_meter"}  # reasons without a calibration
 VARIANCE_RATIO = 2.0  # of observed and declared variances, beyond which a warning is given
 
 
@@ -45,8 +52,13 @@ def keep_up(inputs, state=NO_STATE):
     """
     sections, operation = inputs.sections, inputs.operation_of_meters()
     warnings = list(inputs.warnings)
-    estimation = estimate(operation, inputs.steps, state=state)
-    probability = sections["upkeep"]["coverage_probability"] or 0.95
+    probability, solutions = sections["upkeep"]["coverage_probability"] or 0.95, []
+    is_free = inputs.start == SALES
+    if is_free:
+        operation, estimation, solutions = estimate_sizes(operation, inputs.steps, state)
+        probability = sections["upkeep"]["coverage_probability"] or STOCK_PROBABILITY
+    else:
+        estimation = estimate(operation, inputs.steps, state=state)
     k = float(coverage_factor(probability, np.inf))
     ratio = estimation.triangle.chi2 / max(estimation.triangle.count, 1)
     scale = float(np.sqrt(max(ratio, 1.0)))
@@ -68,13 +80,22 @@ def keep_up(inputs, state=NO_STATE):
         watched = suspect_clock(watched, (inputs.clock[0] - inputs.steps.marks.time_ns[0]) * 1e-9,
                                 inputs.clock[1])  # fmt: skip
     reasons = _refusals(estimation, table, low, high, former_u, seen, inputs.traceable)
+    if inputs.start == "drawing" and "wide_former" not in reasons:
+        reasons.append("wide_former")  # a drawing does not know the volume below the levels
+    if is_free:
+        reach = table.height_m[-1] * np.array(CERTIFIED_RANGE)
+        reasons = [_OF_STOCK.get(reason, reason) for reason in reasons if reason != "wide_former"]
+        if not (low <= reach[0] and high >= reach[1]):
+            reasons.append("stock_range")
+        reasons.append("stock_contents")
     if watched.alarm_s is not None:
         reasons.append("alarm")
     mode = "improved"
     if {"few_steps", "small_range", "global_test", "outliers", "alarm"} & set(reasons):
         mode = "watched"
-    elif "wide_former" in reasons:
+    elif {"wide_former", "stock_contents"} & set(reasons):
         mode = "deliveries"
+    is_shown = mode != "deliveries" if not is_free else mode == "deliveries"
     if mode == "watched":
         volume, factor = table.volume_m3, table.factor_m3
     table_scale = 1.0 if mode == "watched" else scale
@@ -93,6 +114,11 @@ def keep_up(inputs, state=NO_STATE):
         k=k,
         **{name: sections["upkeep"][name] for name in ("site", "by", "note", "service")},
         liquid=sections["liquid"]["name"],
+        start=saved.UpkeepStart(
+            inputs.start,
+            is_free and bool({"stock_meter", "stock_range"} & set(reasons)),
+            solutions,
+        ),
         mode=mode,
         reasons=reasons,
         period=saved.UpkeepPeriod(
@@ -102,13 +128,13 @@ def keep_up(inputs, state=NO_STATE):
         ),
         fit=saved.UpkeepFit(estimation.triangle.chi2, estimation.triangle.count,
                             estimation.probability, estimation.passes, scale),
-        rows=[] if mode == "deliveries" else [
+        rows=[] if not is_shown else [
             saved.UpkeepRow(float(h), float(old), float(k * u), float(new), float(U),
                             _error_ratio(new - old, k * u, U), bool(is_seen))
             for h, old, u, new, U, is_seen in zip(
                 table.height_m, table.volume_m3, former_u, volume, spread, seen, strict=True)
         ],
-        factor=[] if mode == "deliveries" else blocks_of(table_scale * factor),
+        factor=[] if not is_shown else blocks_of(table_scale * factor),
         deliveries=_deliveries(table, volume, factor, low, high, k, table_scale),
         meters=_meters(estimation, operation, inputs, factor, low, high, k, scale),
         causes=_causes(estimation),
@@ -151,7 +177,7 @@ def update_table(estimation, stock, low_m, high_m):
     Parameters
     ----------
     estimation : estimation.Estimation
-    stock : causes.TableStock
+    stock : causes.TableStock or start.LyingStock
     low_m, high_m : float
         Levels of the used steps.
 
@@ -163,7 +189,7 @@ def update_table(estimation, stock, low_m, high_m):
     table, count = stock.table, len(stock.names)
     x, covariance = estimation.triangle.estimate[:count], estimation.covariance[:count, :count]
     held = np.clip(table.height_m, low_m, high_m)
-    columns, at_ends = stock.factor_m3, stock.columns(held, x)
+    columns, at_ends = stock.columns(table.height_m, x), stock.columns(held, x)
     below = table.height_m < low_m
     share = np.where(below, table.volume_m3 / table.volume(np.array([low_m]))[0], 1.0)
     moved = share[:, None] * at_ends
@@ -171,7 +197,8 @@ def update_table(estimation, stock, low_m, high_m):
     sizes, axes = np.linalg.eigh(np.eye(count) - covariance)
     known = axes * np.sqrt(np.maximum(sizes, 0.0))
     factor = np.hstack([columns @ inside, (columns - moved) @ known])
-    return table.volume_m3 + moved @ x, factor
+    change = share * (stock.volume_m3(held, x) - table.volume(held))
+    return table.volume_m3 + change, factor
 
 
 def _refusals(estimation, table, low, high, former_u, seen, traceable):
