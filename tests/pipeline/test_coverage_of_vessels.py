@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from draws import draws
 from generated_rings import U, strapped_job
+from generated_solids import SPHERES
 from generated_vessels import BALLS, WeldedTank, make_ball, make_lying
 from page_figures import figures_of, ratios_agree, shares_agree
 from scipy.stats import binom
 from strapped_balls import strapped_job as strapped_ball
 from test_coverage_of_rings import SHARES, base_job  # noqa: F401  (a fixture)
-from test_coverage_of_strapped_spheres import FOLDER
+from test_coverage_of_strapped_spheres import FOLDER, found_of
 
 from tankcal.methods.great_circles.sphere import find_strapped_sphere
 from tankcal.methods.rings.wall import find_ringed_wall
@@ -199,3 +200,27 @@ def test_intervals_hold_on_spheres_of_vessels_study(figure, family):
     # within the range, or beside it by the sampling error of both studies
     nearest = np.clip(wide, float(low), float(high))
     assert ratios_agree(wide, f"{nearest:.1f}", count, int(full))
+
+
+@pytest.mark.study
+def test_width_on_spheres_of_both_sets_study(figure):
+    """Spheres with and without pressed legs together: those of `generated_solids` and of here."""
+    count, rng = draws(10, 70), np.random.default_rng(4242)
+    totals = [
+        [values[-1] for values in found_of(rng, family)] for family in SPHERES for _ in range(count)
+    ]
+    for family in BALLS:
+        found = [errors_of_ball(seed, family) for seed in range(30_000, 30_000 + count)]
+        totals += [[values[len(SHARES)] for values in one] for one in found]
+    error, expanded = np.transpose(totals)
+    wide = expanded.mean() / 1.96 / np.sqrt(np.mean(error**2))
+    held = np.mean(np.abs(error) <= expanded)
+    figure("spheres of both sets: held totals; mean U over 1.96 rms errors", f"{held}; {wide}")
+    stated, ratio, full = figures_of(
+        "docs/studies/spheres.md",
+        "Over both sets () of the totals were held, and U is () times 1.96 rms errors (() spheres)",
+    )
+    assert shares_agree([held], [stated], len(totals), int(full))
+    assert ratios_agree(wide, ratio, len(totals), int(full))
+    (far,) = figures_of("docs/studies/spheres.md", "No error of these totals exceeded () U")
+    assert not np.any(np.abs(error) > float(far) * expanded)
