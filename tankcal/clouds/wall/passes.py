@@ -34,6 +34,7 @@ MIX = tuple(  # multipliers of splitmix64
 PIECE = 1 << 16  # points hashed at a time
 FARTHEST_M = 1e8  # largest coordinate, m; the resolution of float64 is 15 nm there
 SAMPLE = 500_000  # points of the sample
+WAITING = 0.25  # points that wait for a reduction of the sample, as a share of the sample: memory
 # Height and width of a cell, m; least number of columns, if memory and points suffice
 ROW_M, COLUMN_M, FEWEST_COLUMNS = 0.05, 0.15, 360
 MEMORY_BYTES = 256 << 20  # memory of the sums of all scans, bytes
@@ -130,7 +131,7 @@ class PointSample:
             self._key.append(key[taken])
             self._scan.append(np.full(len(taken), scan, dtype=np.int64))
             self._waiting += len(taken)
-            if self._waiting > self.most:
+            if self._waiting > self.most * WAITING:
                 self.reduce()
 
     def merge(self, other):
