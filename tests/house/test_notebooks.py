@@ -2,6 +2,8 @@
 
 import ast
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -62,3 +64,20 @@ def test_a_tutorial_calls_public_names_only(path):
                 assert not any(one.name.startswith("_") for one in node.names)
             if isinstance(node, ast.Attribute):
                 assert not node.attr.startswith("_"), node.attr
+
+
+@pytest.mark.slow
+def test_the_notebook_of_upkeep_is_executed(tmp_path):
+    """By nbconvert, with its figures; all others are executed by `make notebooks`."""
+    done = subprocess.run(
+        [sys.executable, "-m", "nbconvert", "--to", "notebook", "--execute", "--output-dir",
+         str(tmp_path), str(FOLDER / "22_upkeep.ipynb")],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-2000:]
+    cells = code_of(tmp_path / "22_upkeep.ipynb")
+    outputs = [output for cell in cells for output in cell["outputs"]]
+    assert sum("image/png" in output.get("data", {}) for output in outputs) == 2
+    text = "".join("".join(output.get("text", "")) for output in outputs)
+    assert "all agree" in text
+    assert "leak or another loss by time" in text

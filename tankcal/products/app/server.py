@@ -64,6 +64,14 @@ from tankcal.products.app.pages import (
 )
 from tankcal.products.app.people import APPROVE, EDIT, RUN
 from tankcal.products.app.review_pages import decide, issue_certificate, show_review, take_over
+from tankcal.products.app.service_pages import (
+    add_logs,
+    create_service,
+    list_services,
+    send_paper,
+    show_service,
+    show_services,
+)
 from tankcal.text.shipped import LANGUAGES, shipped_folder
 
 FOLDER = Path(__file__).parent
@@ -154,6 +162,11 @@ def make_application(site, base=""):
         Route("/register", show_register, methods=get),
         Route("/register.csv", send_register, methods=get),
         Route("/register/withdraw", permit(APPROVE, withdraw_certificate), methods=post),
+        Route("/service", show_services, methods=get),
+        Route("/service", permit(EDIT, create_service), methods=post),
+        Route("/service/{key:str}", show_service, methods=get),
+        Route("/service/{key:str}", permit(EDIT, add_logs), methods=post),
+        Route("/service/{key:str}/{name:str}", send_paper, methods=get),
         Route("/chart", show_chart, methods=get),
         Route("/chart/job", permit(EDIT, create_from_chart), methods=post),
         Route("/chart.pdf", draw_chart, methods=get),
@@ -302,6 +315,9 @@ async def upload(request):
         raise
     job = "" if is_folder else request.query_params.get("job", "")
     place = f"/job/{job}/import/{key}" if site.path(job) is not None else f"/import/{key}"
+    service = request.query_params.get("service", "")
+    if service in list_services(site):
+        place = f"/service/{service}?upload={key}"
     return JSONResponse({"address": f"{request.app.state.base}{place}"})
 
 

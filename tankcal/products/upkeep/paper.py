@@ -257,6 +257,19 @@ def pages(paper, folder=None, whole=False):
     ]
 
 
+def summary_blocks(paper):
+    """Blocks of the main results: estimate, alarm, months, meters, rows read and left out."""
+    upkeep = paper.record
+    return [
+        blocks.paragraph(paper.result()),
+        *([blocks.listing(paper.reasons())] if paper.reasons() else []),
+        blocks.paragraph(paper.alarm()),
+        *[paper.show(table) for table in (SUSPECTS, MONTHS, DELIVERIES, METERS, CLEANING)
+          if table.rows(upkeep)],
+        blocks.listing(_remarks(paper)),
+    ]  # fmt: skip
+
+
 def _table(paper):
     """Table of the report: every n-th row."""
     rows = paper.record["rows"]

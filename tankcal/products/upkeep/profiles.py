@@ -94,6 +94,11 @@ class LogProfile:
         return values
 
 
+def list_profiles():
+    """Shipped profiles, {name: path}."""
+    return {path.stem: path for path in sorted(Path(str(shipped_folder(_FOLDER))).glob("*.toml"))}
+
+
 def read_log_profile(name, kind, folder, log):
     """Read a profile.
 
@@ -112,7 +117,7 @@ def read_log_profile(name, kind, folder, log):
         None after a problem, which is in the log.
     """
     name = name or "plain"
-    shipped = {path.stem: path for path in Path(str(shipped_folder(_FOLDER))).glob("*.toml")}
+    shipped = list_profiles()
     path = folder / name if name.endswith(".toml") else shipped.get(name)
     if path is None:
         text = message("upkeep_no_profile", "no profile {name}; expected a TOML file, or a name of "

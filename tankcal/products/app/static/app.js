@@ -297,7 +297,8 @@ function listenToDrop(place) {
     const list = JSON.stringify(files.map(([path, file]) => [path, file.size]));
     take(new File([list, "\n", ...files.map(([, file]) => file)], files[0]?.[0].split("/")[0] ?? "-"), true);
   };
-  input.addEventListener("change", () => take(input.files[0]));
+  const takeAll = (files) => (files.length > 1 ? takeFolder([...files].map((file) => [file.name, file])) : take(files[0]));
+  input.addEventListener("change", () => takeAll(input.files));
   if (!("webkitdirectory" in folder)) status.textContent = texts.noFolder;
   folder.addEventListener("change", () => takeFolder([...folder.files].map((file) => [file.webkitRelativePath, file])));
   place.addEventListener("dragover", (event) => { event.preventDefault(); place.classList.add("over"); });
@@ -307,7 +308,7 @@ function listenToDrop(place) {
     place.classList.remove("over");
     const entry = event.dataTransfer.items[0]?.webkitGetAsEntry?.();
     if (entry?.isDirectory) readFolder(entry, entry.name, []).then(takeFolder, (error) => tell(error.message));
-    else take(event.dataTransfer.files[0]);
+    else takeAll(event.dataTransfer.files);
   });
 }
 
