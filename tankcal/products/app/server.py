@@ -68,7 +68,7 @@ from tankcal.products.app.service_pages import (
     add_logs,
     create_service,
     list_services,
-    send_paper,
+    send_document,
     show_service,
     show_services,
 )
@@ -166,7 +166,7 @@ def make_application(site, base=""):
         Route("/service", permit(EDIT, create_service), methods=post),
         Route("/service/{key:str}", show_service, methods=get),
         Route("/service/{key:str}", permit(EDIT, add_logs), methods=post),
-        Route("/service/{key:str}/{name:str}", send_paper, methods=get),
+        Route("/service/{key:str}/{name:str}", send_document, methods=get),
         Route("/chart", show_chart, methods=get),
         Route("/chart/job", permit(EDIT, create_from_chart), methods=post),
         Route("/chart.pdf", draw_chart, methods=get),

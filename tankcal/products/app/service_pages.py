@@ -1,4 +1,4 @@
-"""Pages of tanks in service: the logs of a month, what was read, the estimate, alarms, papers."""
+"""Pages of tanks in service: the logs of a month, rows read, estimate, alarms, documents."""
 
 import asyncio
 import fnmatch
@@ -86,15 +86,15 @@ async def create_service(request):
 
 
 async def show_service(request):
-    """Logs, estimate, alarms, months and papers of a tank in service."""
+    """Logs, estimate, alarms, months and documents of a tank in service."""
     folder, language = service_of(request), language_of(request)
     key = request.query_params.get("upload", "")
     stored = request.app.state.site.upload(key)
     received = [] if stored is None else await asyncio.to_thread(_examine, folder, stored)
-    blocks, papers = await asyncio.to_thread(_show_results, folder, language)
+    blocks, documents = await asyncio.to_thread(_show_results, folder, language)
     return render(
         request, "service", tank=folder.name, service=request.path_params["key"], blocks=blocks,
-        papers=papers, received=received, upload=key if received else "",
+        documents=documents, received=received, upload=key if received else "",
         is_usable=any(state == "new" for _, _, state in received),
         patterns=[pattern for _, pattern in _list_patterns(folder)],
     )  # fmt: skip
@@ -153,7 +153,7 @@ def _compute(folder, stored, language):
     changed = [name for name, _, state in states if state == "other"]
     if changed:
         text = message("upkeep_other_log", "a log of this name has other content; expected another "
-                       "name, or the same log")  # fmt: skip
+                       "name, or an equal log")  # fmt: skip
         raise InputError([Problem(name, text) for name in changed])
     new = {name for name, _, state in states if state == "new"}
     sent = dict(_list_sent(stored)) if new else {}
@@ -171,7 +171,7 @@ def _compute(folder, stored, language):
 
 
 def _show_results(folder, language):
-    """(blocks as HTML, names of the papers) of the results of a tank."""
+    """(blocks as HTML, names of the documents) of the results of a tank."""
     path = folder / RESULTS / "upkeep.json"
     if not path.is_file():
         return [], []
@@ -192,7 +192,7 @@ def _frame(block, html):
     return frame.format(block["caption"], html)
 
 
-async def send_paper(request):
+async def send_document(request):
     """Send a file of the results."""
     from tankcal.products.upkeep.paper import DOCUMENT
 
