@@ -90,6 +90,33 @@ def factor_of(capacity):
     return factor
 
 
+def combinations_of(capacity):
+    """Return the kept rows of all blocks, and the combination that gives each row of the table.
+
+    Parameters
+    ----------
+    capacity : dict
+        Part of a record.
+
+    Returns
+    -------
+    kept_m3 : list of list of float
+        Kept rows, from the lowest block up, m3.
+    combinations : list of (int, list of float)
+        For each row of the table, the index of its first kept row, and the weights of the kept
+        rows from there.
+    """
+    kept_m3, combinations = [], []
+    for block in capacity["factor"]:
+        first = len(kept_m3)
+        kept_m3 += block["factor_m3"]
+        if block["weights"] is None:
+            combinations += [(row, [1.0]) for row in range(first, len(kept_m3))]
+        else:
+            combinations += [(first, weights) for weights in block["weights"]]
+    return kept_m3, combinations
+
+
 def wrap_factor(capacity):
     """Return the part `capacity` of version 1 or a draft of 2 with its whole factor as a block."""
     other = {name: value for name, value in capacity.items() if name != "factor_m3"}

@@ -273,7 +273,8 @@ def _decimals(u, significant, least):
     if not u:
         return max(UNKNOWN_DECIMALS, least or 0)
     decimals = significant - 1 - u.adjusted()
-    if _spread(u, decimals).adjusted() > u.adjusted():  # 0.0996 -> 0.10
+    # 0.0996 -> 0.10; only digits that begin with 9 can be rounded to the next power of ten.
+    if u.as_tuple().digits[0] == 9 and _spread(u, decimals).adjusted() > u.adjusted():
         decimals -= 1
     return decimals if least is None else max(decimals, least)
 

@@ -83,7 +83,8 @@ def test_input_cells_have_names_and_prompts(record, language, tmp_path):
 
 OLD = {"IF", "AND", "OR", "NOT", "ISBLANK", "ISNUMBER", "ISLOGICAL", "INDEX", "MATCH", "MIN", "MAX",
        "ROWS", "ROUND", "CHOOSE", "SUMSQ", "SQRT", "EXP", "NORMSINV", "BETAINV", "LN", "ABS",
-       "SIGN", "INT", "MOD", "COUNT", "SUMPRODUCT", "ISERROR"}  # fmt: skip
+       "SIGN", "INT", "MOD", "COUNT", "SUM", "SUMPRODUCT", "MMULT",
+       "ISERROR"}  # fmt: skip
 
 
 WITHOUT_READING = {
@@ -135,7 +136,14 @@ def test_capacity_mm_is_blank_in_a_critical_zone(roofed):
 
 def test_the_factor_gives_the_covariance_of_the_rows(record, path):
     table = pd.read_excel(path, sheet_name="Covariance factor")
-    factor = table.iloc[:, 1:].to_numpy()
     assert len(set(table.columns)) == 1 + len(record["capacity"]["inputs"])
+    kept = table.iloc[:, 1:].to_numpy()
+    combinations = pd.read_excel(path, sheet_name="Covariance weights")
+    assert list(combinations["Dip (m)"]) == record["capacity"]["height_m"]
+    weights = combinations.iloc[:, 3:].to_numpy()
+    rows = zip(combinations["First kept row"], combinations["Last kept row"], weights, strict=True)
+    factor = np.array(
+        [row[: last - first + 1] @ kept[first - 1 : last] for first, last, row in rows]
+    )
     u = np.sqrt((factor**2).sum(axis=1))
     np.testing.assert_allclose(u, record["capacity"]["u_m3"], rtol=1e-13)

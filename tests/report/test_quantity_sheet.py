@@ -26,7 +26,7 @@ from tankcal.errors import InputError
 from tankcal.products.quantity.chain import QUANTITIES
 from tankcal.products.quantity.table import read_table
 from tankcal.report.workbook.book import Book
-from tankcal.report.workbook.calculator import factor_sheet
+from tankcal.report.workbook.calculator import factor_sheets
 from tankcal.report.workbook.capacity import capacity_sheet
 from tankcal.report.workbook.quantity import FORM, KEYS, quantity_sheets
 from tankcal.report.workbook.quantity.uncertainty import QUANTITIES as OF_SHEET
@@ -73,7 +73,7 @@ def write_form(record, path, language="en"):
     words = load_words(language)
     record = translate_record(words, record)
     with Book(path, record, words) as book:
-        for sheet in (capacity_sheet, quantity_sheets, factor_sheet):
+        for sheet in (capacity_sheet, quantity_sheets, factor_sheets):
             sheet(book, record)
 
 

@@ -9,7 +9,7 @@ import pytest
 from openpyxl.utils import get_column_letter
 
 from tankcal.report.workbook.book import Book
-from tankcal.report.workbook.calculator import calculator_sheets, factor_sheet
+from tankcal.report.workbook.calculator import calculator_sheets, factor_sheets
 from tankcal.report.workbook.capacity import capacity_sheet, densities_sheet
 from tankcal.text.words import translate_record
 
@@ -17,7 +17,8 @@ FIRST_COLUMN = 6  # of the copies of the calculator: F and on, its own is B
 _CELL = re.compile(r"\bB(\d+)\b")
 _WITH_FORMULAS = ("dip_calculator", "workings")
 _READ = (
-    *("capacity", "other_densities", "covariance_factor", "quantity", "quantity_workings"),
+    *("capacity", "other_densities", "covariance_factor", "covariance_weights", "quantity"),
+    "quantity_workings",
     *_WITH_FORMULAS,
 )
 
@@ -118,7 +119,7 @@ def calculators(groups, words, folder):
 def _write(record, words, path):
     """Only the calculator and what it reads, of a whole workbook."""
     with Book(path, record, words) as book:
-        for sheet in (capacity_sheet, densities_sheet, calculator_sheets, factor_sheet):
+        for sheet in (capacity_sheet, densities_sheet, calculator_sheets, factor_sheets):
             sheet(book, record)
 
 

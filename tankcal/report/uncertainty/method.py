@@ -96,10 +96,10 @@ def default_effects(paper):
     """
     record = paper.record
     sentences = []
-    for line in budget_lines(record):
-        if not line.get("is_default"):  # the shares take long in a long table
-            continue
-        of_rows, of_budgets = simulated_shares(record, line["input"])
+    defaults = [line for line in budget_lines(record) if line.get("is_default")]
+    variances = variances_of_rows(record["capacity"]) if defaults else None
+    for line in defaults:
+        of_rows, of_budgets = simulated_shares(record, variances, line["input"])
         rows, stated = (int(np.sum(shares > LARGER_PART)) for shares in (of_rows, of_budgets))
         if rows + stated:
             sentences.append(
@@ -118,13 +118,25 @@ def default_effects(paper):
     return sentences
 
 
-def simulated_shares(record, name):
+def variances_of_rows(capacity):
+    """Return the variances by each column of the factor, m6, shape (rows, inputs).
+
+    The rows have an interval by Monte Carlo and u above 0. Rows of the table have no lines of a
+    budget, so that their shares follow from the factor.
+    """
+    variances = factor_of(capacity)[flag_simulated(capacity)] ** 2
+    return variances[variances.sum(axis=1) > 0]
+
+
+def simulated_shares(record, variances, name):
     """Return the shares of an input in the variances of results whose interval is by Monte Carlo.
 
     Parameters
     ----------
     record : dict
         Record with a capacity table.
+    variances : ndarray
+        Variances of `variances_of_rows`.
     name : str
         Name of the input.
 
@@ -134,9 +146,6 @@ def simulated_shares(record, name):
         Shares in rows of the table with u above 0, and in stated volumes and deliveries.
     """
     capacity = record["capacity"]
-    # Rows of the table have no lines of a budget; their shares follow from the factor.
-    variances = factor_of(capacity)[flag_simulated(capacity)] ** 2
-    variances = variances[variances.sum(axis=1) > 0]
     is_input = [kind == name for kind in capacity.get("input_kind") or capacity["inputs"]]
     of_rows = variances[:, is_input].sum(axis=1) / variances.sum(axis=1)
     of_budgets = [

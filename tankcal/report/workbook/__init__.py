@@ -6,7 +6,7 @@ The package computes no results. The cells contain values of the record, possibl
 
 from tankcal.methods.base import methods
 from tankcal.report.workbook.book import Book
-from tankcal.report.workbook.calculator import calculator_sheets, factor_sheet
+from tankcal.report.workbook.calculator import calculator_sheets, factor_sheets
 from tankcal.report.workbook.capacity import (
     capacity_sheet,
     densities_sheet,
@@ -40,7 +40,8 @@ from tankcal.text.words import language_of, load_words, translate_record
 
 # Sheets for other programs, which would print on hundreds of pages: hidden.
 _HIDDEN = (
-    *("capacity_mm", "workings", "quantity_workings", "covariance_factor", "monte_carlo"),
+    *("capacity_mm", "workings", "quantity_workings", "covariance_factor"),
+    *("covariance_weights", "monte_carlo"),
     *("points", "adjusted_points", "observations", "deviations"),
     *(sheet for method in methods() for sheet in method.hidden_sheets),
 )
@@ -90,7 +91,7 @@ def _sheets_of_tank(book, record):
     millimetres_sheet(book, record)
     calculator_sheets(book, record)
     quantity_sheets(book, record)
-    factor_sheet(book, record)
+    factor_sheets(book, record)
     tables_sheets(book, record)
     if record.get("ship"):
         ship_sheet(book, record)

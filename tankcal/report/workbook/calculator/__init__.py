@@ -31,12 +31,12 @@ from tankcal.report.workbook.calculator.cells import (
 )
 from tankcal.report.workbook.calculator.sentences import KEYS, number, refused_word, sentences
 from tankcal.report.workbook.calculator.service import CODES, SHELL_C
-from tankcal.report.workbook.calculator.table import Table, column_names, factor_sheet
+from tankcal.report.workbook.calculator.table import Table, column_names, factor_sheets
 from tankcal.report.workbook.look import ACCENT, INPUT, MUTED, number_format
 from tankcal.text.digits import LITRE_DECIMALS, NOTHING, bound_of_decimals, fixed, shortest
 from tankcal.text.words import marks_of, name_of_input
 
-__all__ = ["calculator_sheets", "factor_sheet"]
+__all__ = ["calculator_sheets", "factor_sheets"]
 
 
 FORM, WORKINGS = "dip_calculator", "workings"

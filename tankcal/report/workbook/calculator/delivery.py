@@ -11,6 +11,7 @@ import numpy as np
 
 from tankcal.report.workbook.calculator.cells import Line, if_number, quoted
 from tankcal.report.workbook.calculator.coverage import normal, student
+from tankcal.report.workbook.calculator.table import factor_formula
 from tankcal.text.digits import LITRE_DECIMALS, NOTHING
 from tankcal.uncertainty import dof_of, least_of, sum_of_fourths
 
@@ -49,8 +50,9 @@ def _if(table, value):
 
 def _factor_at(dip, column):
     """Return the formula of a column of the factor at a dip, linear between two rows."""
-    low = f"INDEX(covariance_factor,[{dip}_row],{column})"
-    high = f"INDEX(covariance_factor,[{dip}_next],{column})"
+    low, high = (
+        f"SUM({factor_formula(f'[{dip}_{row}]', column, column)})" for row in ("row", "next")
+    )
     return f"({low}*(1-[{dip}_part])+{high}*[{dip}_part])"
 
 

@@ -3,9 +3,9 @@
 import math
 from collections import Counter
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 
-from tankcal.record.covariance_factor import factor_of
+from tankcal.record.covariance_factor import combinations_of, factor_of
 from tankcal.report.uncertainty.sources import critical_zone, groups_of
 from tankcal.report.uncertainty.stated import k_of_rows, stated_U_m3
 from tankcal.report.workbook.capacity import digits_of_heights
@@ -90,22 +90,50 @@ def column_names(book, capacity):
     return names
 
 
-def factor_sheet(book, record):
-    """Write dips in m and the columns of the factor in m³; no sheet without uncertain inputs.
+def factor_sheets(book, record):
+    """Write the kept rows of the factor in m³, and the weights by which they give all rows.
 
-    The covariance of two rows is the sum over the columns of the products of their factors.
+    The covariance of two rows is the sum over the columns of the products of their factors. The
+    sheets have a tenth of the cells of the whole factor, which they give to rounding.
     """
     capacity = record["capacity"]
     if not capacity["inputs"]:
         return
-    heights = capacity["height_m"]
-    columns = [
-        Column(book.word("columns.dip_m", of="calculator"), heights, height_digits(heights), 12)
-    ]
-    factor_columns = factor_of(capacity).T
+
+    def column(key, cells, digits=0, width=12, **values):
+        heading = book.word(f"columns.{key}", of="calculator", **values)
+        return Column(heading, cells, digits, width)
+
+    kept, combinations = combinations_of(capacity)
+    columns = [column("kept_row", [float(row) for row in range(1, len(kept) + 1)])]
     columns += [
-        Column(name, cells.tolist(), _DIGITS, _WIDTH)
-        for name, cells in zip(column_names(book, capacity), factor_columns, strict=True)
+        Column(name, cells, _DIGITS, _WIDTH)
+        for name, cells in zip(column_names(book, capacity), zip(*kept, strict=True), strict=True)
     ]
     sheet = book.plain_sheet("covariance_factor", columns, landscape=True)
-    book.name("covariance_factor", sheet, 1, len(heights), 1, len(columns) - 1)
+    book.name("covariance_factor", sheet, 1, len(kept), 1, len(columns) - 1)
+
+    heights = capacity["height_m"]
+    weights = list(zip_longest(*(weights for _, weights in combinations)))
+    columns = [
+        column("dip_m", heights, height_digits(heights)),
+        column("first_kept", [first + 1.0 for first, _ in combinations]),
+        column("last_kept", [float(first + len(row)) for first, row in combinations]),
+        *(column("weight", cells, _DIGITS, _WIDTH, number=i) for i, cells in enumerate(weights, 1)),
+    ]
+    sheet = book.plain_sheet("covariance_weights", columns, landscape=True)
+    for name, first, last in (("first", 1, 1), ("last", 2, 2), ("weights", 3, len(columns) - 1)):
+        book.name(f"covariance_{name}", sheet, 1, len(heights), first, last)
+
+
+def factor_formula(row, first=0, last=0):
+    """Return the formula of columns `first` to `last` (0: all) of the factor at a row of the table.
+
+    It multiplies the weights of the row by its kept rows; its result is a matrix of a single row.
+    """
+    kept_first, kept_last = (f"INDEX(covariance_{end},{row})" for end in ("first", "last"))
+    count = f"{kept_last}-{kept_first}+1"
+    return (
+        f"MMULT(INDEX(covariance_weights,{row},1):INDEX(covariance_weights,{row},{count}),"
+        f"INDEX(covariance_factor,{kept_first},{first}):INDEX(covariance_factor,{kept_last},{last}))"
+    )

@@ -10,6 +10,7 @@ from itertools import pairwise
 
 from tankcal.report.uncertainty.sources import read_room_levels, roof_of
 from tankcal.report.workbook.calculator.coverage import normal, student
+from tankcal.report.workbook.calculator.table import factor_formula
 from tankcal.report.workbook.quantity.correction import (
     NONE,
     STATES,
@@ -138,10 +139,9 @@ def _dof_formula(table, row):
     least = least_of([group.dof for group in groups])
 
     def dof(row):
-        every = f"SUMSQ(INDEX(covariance_factor,{row},0))"
+        every = f"SUMSQ({factor_formula(row)})"
         fourth = "+".join(
-            f"SUMSQ(INDEX(covariance_factor,{row},{group.first + 1}):"
-            f"INDEX(covariance_factor,{row},{group.last + 1}))^2/{group.dof!r}"
+            f"SUMSQ({factor_formula(row, group.first + 1, group.last + 1)})^2/{group.dof!r}"
             for group in groups
         )
         return f"IF({fourth}>0,MAX({every}^2/({fourth}),{least!r}),{_INFINITE})"
@@ -153,8 +153,7 @@ def _factor(state, *, is_net):
     """Formula of the row of the covariance factor of TOV of a gauging, or of TOV - FW."""
 
     def at(key):
-        low, high = (f"INDEX(covariance_factor,[use_{key}_row_{state}]{end},0)"
-                     for end in ("", "+1"))  # fmt: skip
+        low, high = (factor_formula(f"[use_{key}_row_{state}]{end}") for end in ("", "+1"))
         return f"({low}*(1-[use_{key}_part_{state}])+{high}*[use_{key}_part_{state}])"
 
     water = f"-[use_has_water_{state}]*{at('water')}" if is_net else ""
@@ -265,7 +264,7 @@ def _room_rows(table, name, dip, roof):
     value = f"{sign}*([fill@]+(1-{rests})*[fra_c]-{present})"
     by_table = "0"
     if table.capacity["inputs"]:
-        low, high = (f"INDEX(covariance_factor,[fill_row@]{end},0)" for end in ("", "+1"))
+        low, high = (factor_formula(f"[fill_row@]{end}") for end in ("", "+1"))
         there = f"({low}*(1-[fill_part@])+{high}*[fill_part@])"
         by_table = f"[ctsh_c]^2*SUMPRODUCT(({there}-{_factor('c', is_net=False)})^2)"
     names = list(contributions)
