@@ -440,10 +440,14 @@ class Sheet(Worksheet):
         for look in dict.fromkeys(numbers.looks):
             if look not in indices:
                 indices[look] = look._get_xf_index()
-        if None not in numbers.values:
+        count = len(numbers.values)
+        while count and numbers.values[count - 1] is None:
+            count -= 1
+        values = numbers.values[:count]
+        if None not in values:
             # A cell without its place follows the cell before; this halves a large sheet.
-            template = self._template_of(numbers.looks, indices)
-            self.fh.write(template % tuple(numbers.values))
+            template = self._template_of(numbers.looks, count, indices)
+            self.fh.write(template % tuple(values))
             return
         cells = [
             f'<c r="{name}{row + 1}" s="{indices[look]}"><v>{value:.16G}</v></c>'
@@ -452,9 +456,11 @@ class Sheet(Worksheet):
         ]
         self.fh.write("".join(cells))
 
-    def _template_of(self, looks, indices):
-        """Return the text of a row without blank cells, for the operator %."""
+    def _template_of(self, looks, count, indices):
+        """Return the text of a row of `count` cells without blanks between, for the operator %."""
         if looks is not self._looks:
-            self._looks = looks
-            self._template = "".join(f'<c s="{indices[look]}"><v>%.16G</v></c>' for look in looks)
-        return self._template
+            self._looks, self._templates = looks, {}
+        if count not in self._templates:
+            cells = (f'<c s="{indices[look]}"><v>%.16G</v></c>' for look in looks[:count])
+            self._templates[count] = "".join(cells)
+        return self._templates[count]
