@@ -10,7 +10,6 @@ from tankcal.job.checks.bearing import useless_inputs
 from tankcal.job.checks.extent import is_strapped
 from tankcal.job.contract import INPUTS
 from tankcal.job.contract.bottom import bottom_form
-from tankcal.job.contract.parts import MESH_UNITS_M
 from tankcal.job.contract.ship import BOW_DEG, is_ship
 from tankcal.job.contract.uncertainty import spreads, standard_u
 from tankcal.job.model import (
@@ -26,7 +25,6 @@ from tankcal.job.model import (
     Job,
     Levels,
     Material,
-    Mesh,
     Roof,
     Ship,
     Sphere,
@@ -224,8 +222,7 @@ def make_job(raw, values, tables, attached, measurements, warnings):
         diameter_within_m=None if within_mm is None else within_mm / 1000,
         inspection=_optional(Inspection, values["inspection"]),
         levels=_optional(Levels, values["levels"]),
-        mesh=_mesh(values["mesh"], attached.mesh[1]) if kind == "mesh" else None,
-        ship=_ship(values["ship"]) if kind == "mesh" and is_ship(values) else None,
+        ship=_ship(values["ship"]) if is_ship(values) else None,
     )
 
 
@@ -411,7 +408,3 @@ def _ship(values):
         if given["bow_azimuth_rad"] is None
         else given["bow_azimuth_rad"],
     )
-
-
-def _mesh(values, data):
-    return Mesh(values["file"], MESH_UNITS_M[values["unit"]], data)

@@ -86,6 +86,9 @@ def job_of(raw, log, is_whole=True):
         frame = make_frame(raw, values, tables, measurements, tuple(log.warnings))
         return replace(frame, overrulings=overrulings, equipment=equipment)
     job = make_job(raw, values, tables, attached, measurements, tuple(log.warnings))
+    if attached.mesh is not None:
+        (name, *_), data = attached.mesh
+        raw = replace(raw, archives=raw.archives | {name: data})
     by_attribute, by_method = {}, {}
     for method in methods_for(kind_of(raw)):  # two methods may share a table
         if method.is_given(tables):

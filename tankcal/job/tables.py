@@ -271,7 +271,7 @@ class RawJob:
     tables : dict of {str: Table or None}
         Tables by name.
     archives : dict of {str: bytes}
-        Content of the files in ARCHIVES that the job has.
+        Content of the files in ARCHIVES that the job has, and of its mesh.
     files : tuple
         (name, SHA-256, size in bytes) of each file read.
     registers : dict

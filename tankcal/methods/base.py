@@ -27,6 +27,7 @@ _BUILT_IN = (
     "tankcal.methods.rings:RingsMethod",
     "tankcal.methods.great_circles:GreatCirclesMethod",
     "tankcal.methods.inside_hits:InsideHitsMethod",
+    "tankcal.methods.mesh:MeshMethod",
 )
 
 
@@ -89,6 +90,10 @@ class Method:
         Whether a section is named by its course and the sighted level.
     compares_size : bool
         Whether `warnings` compares the size of the whole tank with the drawing.
+    computes_top : bool
+        Whether the top of the tank is computed, to be compared with the reference height.
+    counts_from_plate : bool
+        Whether levels of the solid count from the dip plate.
     comes_last : bool
         Whether its forms and its instruments follow those of the other methods.
     field_forms : tuple of (tuple of str, int)
@@ -129,6 +134,8 @@ class Method:
     has_own_offset = False
     names_levels = False
     compares_size = False
+    computes_top = False
+    counts_from_plate = False
     comes_last = False
     field_forms = ()
     field_facts = ()
@@ -407,6 +414,28 @@ class Method:
         """
         raise NotImplementedError
 
+    def input_values(self, job):
+        """Declared values of inputs that only this method has: {name: value}; None: no value."""
+        return {}
+
+    def undeclared(self, job, survey):
+        """Inputs without a standard uncertainty that affect only `correction_tables`."""
+        return ()
+
+    def correction_tables(self, job, survey, body, table, progress):
+        """`Result.ship`, corrections of readings of the table; None: none are needed.
+
+        Parameters
+        ----------
+        job : Job
+        survey : object
+            Survey that `find` returned.
+        body : Body
+        table : Capacity
+        progress : callable or None
+            Called as progress(text, done, total).
+        """
+
     def warnings(self, job, survey, sights=None):
         """`Problem`s of a survey: undetermined quantities, outliers, disagreement.
 
@@ -438,6 +467,9 @@ class Method:
     def save(self, result):
         """Saved part of a `Result` whose surveys or sights contain this method."""
         raise NotImplementedError
+
+    def zero(self, job):
+        """Code of the zero of the heights of the table; None: the dip plate or the bottom."""
 
     def choices(self, result):
         """Assumptions of the method: {code: value} of `record.choices.Choice`."""

@@ -10,7 +10,7 @@ import numpy as np
 from tankcal.errors import InputError, Problem
 from tankcal.job import Job
 from tankcal.messages import message
-from tankcal.methods.base import supplement_of
+from tankcal.methods.base import given_methods, supplement_of
 from tankcal.pipeline.checks.survey import incomplete_certificate, open_questions
 from tankcal.pipeline.overruling_effects import effect_of, warn_of_overrulings
 from tankcal.pipeline.result import Result
@@ -116,11 +116,11 @@ def _run(job, progress, part_progress, simulated, cluster):
         simulation = simulate_table(job, survey, body, zero, table, pairs, progress=part_progress)
         intervals = simulation.intervals(table)
     supplemented = supplement and supplement.result(tabulation.levels_m)
-    ship = None
-    if job.ship is not None:
-        from tankcal.pipeline.tanks.ship import ship_tables
-
-        ship = ship_tables(job, survey, body, table, progress=part_progress)
+    by_method = (
+        method.correction_tables(job, survey, body, table, part_progress)
+        for method in given_methods(job)
+    )
+    ship = next((tables for tables in by_method if tables is not None), None)
     return Result(
         job=job,
         surveys=_surveys_by_kind(survey, supplemented),

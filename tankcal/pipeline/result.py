@@ -32,13 +32,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tankcal.methods.clouds.wall import Clouded
+    from tankcal.methods.mesh.ship import ShipTables
     from tankcal.methods.radii.wall import RadiiWall
     from tankcal.methods.strapping.wall import StrappedWall
     from tankcal.pipeline.liquid.geometry import NominalWall
     from tankcal.pipeline.liquid.result import LiquidResult
     from tankcal.pipeline.read_wall import ReadWall
     from tankcal.pipeline.scanned_solids import Scan
-    from tankcal.pipeline.tanks.ship import ShipTables
     from tankcal.pipeline.wall.surveyed import Wall
     from tankcal.pipeline.wall_straps import Straps
     from tankcal.survey import Adjustment

@@ -183,12 +183,4 @@ def _survey(job, progress, network):
     for method in given_methods(job):
         if method.finds(job):
             return method.find(job, progress, network).survey
-    if job.mesh is not None:
-        from tankcal.pipeline.tanks.ship import check_pipe
-        from tankcal.tank.meshes import parse_mesh
-
-        progress(message("checking_mesh", "checking the mesh {file}", file=job.mesh.file))
-        mesh = parse_mesh(job.mesh.file, job.mesh.data, job.mesh.unit_m)
-        check_pipe(job, mesh)
-        return mesh
     return None

@@ -4,13 +4,14 @@ The wall may be that of an adjusted survey or of a plan.
 """
 
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
 from tankcal.geometry.field.sites import MOST_SITES
 from tankcal.messages import message
 from tankcal.methods.base import accompanying_methods, given_methods, method_of
-from tankcal.pipeline.checks.size import check_mesh, check_scan, check_size, check_wall
+from tankcal.pipeline.checks.size import check_reference, check_scan, check_size, check_wall
 from tankcal.pipeline.checks.survey import against_nominal, warn_of_undeclared
 from tankcal.pipeline.tanks import body_of, critical_zone, zero_height
 from tankcal.solver.compiled import threads_for
@@ -161,19 +162,15 @@ def check_table(job, survey, computed, sighting=None):
         *of_size,
         *_check_survey(job, survey, computed.top_m),
         *_check_sights(job, survey, sighting),
-        *warn_of_undeclared(_undeclared(job, survey, computed.body)),
+        *warn_of_undeclared(undeclared_inputs(job, survey, computed.body)),
         *against_nominal(job.tank, computed.table.volume_m3[-1]),
     )
 
 
-def _undeclared(job, survey, body):
+def undeclared_inputs(job, survey, body):
     """Inputs without u: those of the table, then those that affect only corrections of a ship."""
-    of_ship = ()
-    if job.ship is not None:
-        from tankcal.pipeline.tanks.ship import undeclared_of_ship
-
-        of_ship = undeclared_of_ship(job, survey)
-    return tuple(dict.fromkeys((*body.undeclared(), *of_ship)))
+    by_method = (method.undeclared(job, survey) for method in given_methods(job))
+    return tuple(dict.fromkeys((*body.undeclared(), *chain.from_iterable(by_method))))
 
 
 def _check_sights(job, survey, sighting):
@@ -193,14 +190,14 @@ def _check_survey(job, survey, top_m):
     method = method_of(survey)
     if method is not None:
         problems = method.warnings(job, survey)
+        if method.computes_top:
+            problems = (*problems, *check_reference(job, top_m))
     elif survey.surveyed_as == "wall":
         from tankcal.pipeline.wall.finding import warnings_of
 
         problems = (*warnings_of(job, survey), *check_wall(job, survey))
-    elif survey.surveyed_as == "scan":
-        return check_scan(job, survey, top_m)
     else:
-        return check_mesh(job, top_m)
+        return check_scan(job, survey, top_m)
     for other in accompanying_methods(job):
         if other is not method:
             problems = (*problems, *other.warnings(job, survey))

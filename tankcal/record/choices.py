@@ -4,6 +4,7 @@ import numpy as np
 
 from tankcal.adjust import CRITICAL
 from tankcal.methods.base import accompanying_methods, given_methods
+from tankcal.pipeline.table import undeclared_inputs
 from tankcal.pipeline.tanks import as_surveyed
 from tankcal.record.schema import Saved, key
 from tankcal.record.table import zero_of
@@ -49,18 +50,12 @@ def choices_of(result):
         "coverage": job.table.coverage_probability,
         "k": "normal" if np.all(np.isinf(result.table.dof)) else "student",
         "expansion": "given" if job.material.expansion_given else "default",
-        "not_in_budget": _undeclared_inputs(result),
+        "not_in_budget": list(undeclared_inputs(job, survey, result.body)),
     } | later
     if result.adjustment is not None:
         adjustment = _adjustment_values(result.adjustment, getattr(job, "measurements", None))
         values = adjustment | values
     return [Choice(*choice) for choice in values.items()]
-
-
-def _undeclared_inputs(result):
-    """Return inputs without u: of the table, then of the corrections of a ship only."""
-    of_ship = () if result.ship is None else result.ship.undeclared
-    return list(dict.fromkeys((*result.body.undeclared(), *of_ship)))
 
 
 def adjustment_choices(adjustment, measurements):
@@ -181,8 +176,6 @@ def _covariance_choice(job):
 
 
 def _thickness_choice(job, result):
-    if job.mesh is not None:
-        return "surface"
     if job.survey.side == "inside":
         is_surveyed = any(not method.is_supplement for method in given_methods(job))
         return "inside" if is_surveyed or job.courses else "dimensions"

@@ -312,20 +312,10 @@ def solid_of(result):
     job = result.job
     if job.horizontal is not None:
         return _horizontal_details(result)
+    sizes, part = _sizes_by_methods(result), result.body.parts[0]
     if job.sphere is not None:
-        return list_details(
-            diameter=(result.body.parts[0].solid.diameter_m, "m"),
-            **_scan_details(result),
-            **_sizes_by_methods(result),
-            full_capacity=(result.body.parts[0].capacity_m3, "m3"),
-        )
-    if job.mesh is not None:
-        return list_details(
-            mesh_file=(job.mesh.file, None),
-            mesh_faces=(result.body.parts[0].solid.face_count, ""),
-            full_capacity=(result.body.parts[0].capacity_m3, "m3"),
-        )
-    return None
+        sizes = {"diameter": (part.solid.diameter_m, "m"), **_scan_details(result), **sizes}
+    return list_details(**sizes, full_capacity=(part.capacity_m3, "m3")) if sizes else None
 
 
 def _sizes_by_methods(result):

@@ -5,6 +5,7 @@ from dataclasses import fields
 
 import numpy as np
 
+from tankcal.methods.base import given_methods
 from tankcal.pipeline.chain import PARTS
 from tankcal.record.covariance_factor import FactorBlock, blocks_of
 from tankcal.record.schema import Finite, Saved, fill_from, key
@@ -166,8 +167,9 @@ def roof_corrections_of(result):
 
 def zero_of(result):
     """Return the code of the zero of the heights of the table."""
-    if result.job.ship is not None:
-        return "pipe_bottom"
+    for method in given_methods(result.job):
+        if zero := method.zero(result.job):
+            return zero
     if result.job.datum.dip_plate_z_m is not None:
         return "dip_plate"
     return "bottom" if result.job.tank.kind == "vertical" else f"{result.job.tank.kind}_bottom"

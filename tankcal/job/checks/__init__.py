@@ -24,7 +24,6 @@ from tankcal.job.contract.deadwood import check_deadwood
 from tankcal.job.contract.lying import check_horizontal, check_sphere
 from tankcal.job.contract.overrulings import check_overrulings
 from tankcal.job.contract.roof import check_roof
-from tankcal.job.contract.ship import check_ship
 from tankcal.job.contract.stated import check_levels, check_stated
 from tankcal.job.contract.top import check_top
 from tankcal.job.contract.uncertainty import check_inputs
@@ -110,8 +109,6 @@ def _check_of_kind(values, tables, extent, kind, raw, log):
             raw,
             log,
         )
-    if kind == "mesh":
-        check_ship(values, tables, raw, log)
     if tables["deadwood"] is not None:
         check_deadwood(tables["deadwood"], extent, log)
 

@@ -12,7 +12,6 @@ from tankcal.job.checks.extent import (
 from tankcal.job.contract import INPUTS
 from tankcal.job.contract.bottom import SHAPED, bottom_form
 from tankcal.job.contract.lying import RINGS_WITHOUT_TUBE, ROUND_TUBE
-from tankcal.job.contract.ship import is_ship
 from tankcal.messages import message
 from tankcal.methods.base import methods, methods_for
 
@@ -62,8 +61,6 @@ def useless_inputs(values, tables, kind):
     elif kind == "sphere":
         rules |= _of_wall(values["sphere"], values, has_wall_points(tables))
         rules |= _of_sphere(values)
-    elif kind == "mesh":
-        rules |= _of_ship(values)
     for method in methods_for(kind):
         if method.is_given(tables):
             rules |= method.useless_inputs(values, tables)
@@ -249,17 +246,6 @@ def _of_rings(values, tables):
         if is_single
         else "",
     }
-
-
-def _of_ship(values):
-    """Reasons for the inputs of a tank of a ship, sounded through a pipe."""
-    no_pipe = message("no_ship", "expected only with [ship]")
-    no_contraction = message("no_contraction", "expected only with ship.contraction_percent")
-    contracts = values["ship"]["contraction_percent"] is not None
-    of_pipe = dict.fromkeys(
-        ("trim", "list", "pipe_x", "pipe_y", "pipe_lean"), "" if is_ship(values) else no_pipe
-    )
-    return of_pipe | {"contraction": "" if contracts else no_contraction}
 
 
 def _of_radii_of_ends(given):

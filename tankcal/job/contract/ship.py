@@ -216,3 +216,14 @@ def _refuse_other_parts(values, tables, log, refuse):
             "tank",
         )
         refuse("contraction_percent", expected)
+
+
+def useless_inputs_of_ship(values):
+    """{input: reason}, as `Method.useless_inputs`, of inputs that only a sounding pipe has."""
+    no_pipe = message("no_ship", "expected only with [ship]")
+    no_contraction = message("no_contraction", "expected only with ship.contraction_percent")
+    contracts = values["ship"]["contraction_percent"] is not None
+    of_pipe = dict.fromkeys(
+        ("trim", "list", "pipe_x", "pipe_y", "pipe_lean"), "" if is_ship(values) else no_pipe
+    )
+    return of_pipe | {"contraction": "" if contracts else no_contraction}

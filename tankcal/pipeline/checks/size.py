@@ -322,7 +322,7 @@ def check_scan(job, scan, top_m):
                 given_mm=1000 * declared_sd_m,
             )
             problems.append(Problem(origin_of(job.points), text))
-    return [*problems, *_check_foot(job, scan), *_check_reference(job, top_m)]
+    return [*problems, *_check_foot(job, scan), *check_reference(job, top_m)]
 
 
 def _check_foot(job, scan):
@@ -344,11 +344,6 @@ def given_sd_m(points):
     if points.covariance_m2 is not None:
         return float(np.sqrt(np.median(points.covariance_m2.diagonal())))
     return None if points.sd_m is None else float(np.median(points.sd_m))
-
-
-def check_mesh(job, top_m):
-    """Return warnings of a tank declared as a mesh."""
-    return _check_reference(job, top_m)
 
 
 def check_wall(job, wall):
@@ -536,7 +531,7 @@ def stations_of(adjustment, measurements):
     return places[np.isfinite(places).all(axis=1)]
 
 
-def _check_reference(job, top_m):
+def check_reference(job, top_m):
     """Warning of a reference height that differs from the top of the tank.
 
     Only for tanks whose top is computed; for other tanks the check belongs to reading the job.

@@ -14,7 +14,6 @@ __all__ = [
     "body_of",
     "critical_zone",
     "filled_with",
-    "heeled_body",
     "insets_of",
     "shell_volume",
     "thermal_scale",
@@ -46,13 +45,6 @@ def body_of(job, survey, switches=None, uncertain=True):
     from tankcal.pipeline.tanks.solid import solid_body
 
     return solid_body(job, survey, switches)
-
-
-def heeled_body(job, survey, trim, list_):
-    """`Body` of a ship's tank at tangents of trim and list; levels are soundings along its pipe."""
-    from tankcal.pipeline.tanks.solid import solid_body
-
-    return solid_body(job, survey, job.switches, (trim, list_))
 
 
 def zero_height(job, survey):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tankcal.methods.base import method_of
+from tankcal.methods.base import given_methods, method_of
 from tankcal.tank.budgets import Factor
 from tankcal.tank.fittings import deadwood
 from tankcal.tank.heads import End, standard_end
@@ -64,9 +64,10 @@ def estimates_of(job):
         "survey_density": survey.liquid_density_kg_m3,
         "roof_mass": job.roof and job.roof.mass_kg,
         **_sizes_of_solid(job),
-        **_values_of_ship(job),
         **_sizes_of_heads(job),
     }
+    for method in given_methods(job):
+        values_of_inputs |= method.input_values(job)
     return {name: value for name, value in values_of_inputs.items() if value is not None}
 
 
@@ -113,17 +114,6 @@ def _sizes_of_solid(job):
         "dip_position": _thousand(lying.dip_from_a_m),
         "tube_angle": lying.tube_angle_rad and float(np.degrees(lying.tube_angle_rad)),
         "tube_offset": _thousand(lying.tube_offset_m),
-    }
-
-
-def _values_of_ship(job):
-    """Even keel, position of the pipe in the ship's frame, and contraction."""
-    if job.ship is None:
-        return {}
-    share = job.ship.contraction
-    return {
-        **dict.fromkeys(("trim", "list", "pipe_x", "pipe_y", "pipe_lean"), 0.0),
-        "contraction": None if share is None else 100 * share,
     }
 
 

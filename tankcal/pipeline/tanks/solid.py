@@ -1,4 +1,4 @@
-"""Tank of one solid: horizontal cylinder, sphere or mesh, from its sizes or its points."""
+"""Tank of one solid: horizontal cylinder or sphere, from its sizes, points or another survey."""
 
 from dataclasses import replace
 
@@ -14,20 +14,18 @@ from tankcal.pipeline.tanks.common import (
 )
 from tankcal.tank.body import Body, SolidPart
 from tankcal.tank.ellipsoids import Membrane, PressedSphere, Pressure
-from tankcal.tank.meshes import mesh_part
-from tankcal.tank.ships import Pipe, in_ship_frame, piped_mesh
 from tankcal.tank.solids import LyingTank, Sphere
 
 POISSON = 0.3  # default Poisson's ratio, of steel
 
 
-def solid_body(job, survey, switches, heel=(0.0, 0.0)):
-    """`Body` of a solid; `heel` contains the tangents of trim and list of a ship's tank."""
-    method, part = method_of(survey), None
-    if method is not None:
+def solid_body(job, survey, switches, part=None):
+    """`Body` of a solid; part: its `SolidPart`, None: from the survey and the declared sizes."""
+    method = method_of(survey)
+    if part is None and method is not None:
         part = method.part(job, survey, switches)
     if part is None:
-        part = _part(job, survey, switches, heel)
+        part = _part(job, survey, switches)
     parts, zero = [part], solid_zero(job)
     if switches.deadwood and job.deadwood:
         parts.append(deadwood_part(job.deadwood, zero))
@@ -41,8 +39,8 @@ def solid_body(job, survey, switches, heel=(0.0, 0.0)):
     )
 
 
-def _part(job, survey, switches, heel):
-    """`SolidPart` of a tank with declared sizes, with points, or with a mesh."""
+def _part(job, survey, switches):
+    """`SolidPart` of a tank with declared sizes or with points."""
     scale = thermal_scale(job, switches)
     job = sized_job(job, survey)
     declared = job.horizontal or job.sphere
@@ -56,10 +54,8 @@ def _part(job, survey, switches, heel):
         unused = (*unused, *without_effect)
     elif job.sphere is not None:
         solid = Sphere((job.sphere.diameter_m - 2 * plate) * scale)
-    elif job.horizontal is not None:
-        solid = _lying(job.horizontal, plate, scale)
     else:
-        solid = _part_of_mesh(job, survey, scale, heel)
+        solid = _lying(job.horizontal, plate, scale)
     if job.points is not None:
         survey_results = _arguments_of_scan(survey, scale)
         # Offsets of instruments are among the factors of the points.
@@ -84,12 +80,10 @@ def _part(job, survey, switches, heel):
 
 
 def solid_zero(job):
-    """Level of the table's zero above the solid's zero: that of the dip plate, if given, m.
-
-    Levels of a mesh already count from its dip plate.
-    """
+    """Level of the table's zero above the solid's zero: that of the dip plate, if given, m."""
     datum = job.datum
-    if job.mesh is not None or datum.dip_plate_z_m is None:
+    counts_from_plate = any(method.counts_from_plate for method in given_methods(job))
+    if counts_from_plate or datum.dip_plate_z_m is None:
         return 0.0
     if datum.bottom_z_m is None:
         expected = message(
@@ -164,39 +158,6 @@ def _membrane(job):
     poisson = job.material.poisson
     ratio = POISSON if poisson is None else poisson
     return Membrane(job.sphere.thickness_m, job.material.e_pa, ratio)
-
-
-def _part_of_mesh(job, mesh, scale, heel):
-    """Part enclosed by a mesh.
-
-    Levels count from the dip plate or the lowest point; on a ship, along the pipe from its lower
-    end.
-    """
-    if job.ship is not None:
-        return _on_ship(job.ship, mesh, scale, heel)
-    warmed = replace(mesh, vertices_m=scale * mesh.vertices_m)
-    zero = job.datum.dip_plate_z_m
-    if zero is None:
-        zero = job.datum.bottom_z_m
-    return mesh_part(warmed, zero if zero is None else scale * zero)
-
-
-def ship_pipe(ship):
-    """`Pipe` of a `Ship` in the ship's frame."""
-    return Pipe(*in_ship_frame([ship.pipe_bottom_m, ship.pipe_top_m], ship.bow_azimuth_rad))
-
-
-def _on_ship(ship, mesh, scale, heel):
-    """Part enclosed by the mesh of a ship's tank, with levels along its pipe."""
-    contracted = None if ship.contraction is None else 1 - ship.contraction
-    return piped_mesh(
-        replace(mesh, vertices_m=in_ship_frame(mesh.vertices_m, ship.bow_azimuth_rad)),
-        ship_pipe(ship),
-        *heel,
-        scale=scale * (contracted or 1.0),
-        contracted=contracted,
-        marks_m=ship.length_between_marks_m,
-    )
 
 
 def _lying(tank, plate_m, scale):

@@ -66,7 +66,7 @@ def _straps(plan):
     design = plan.design
     for planned in design.straps:
         others = tuple(strap for strap in design.straps if strap is not planned)
-        if others or design.hits or design.tangents is not None or design.runs:
+        if others or any(part.is_wall for part in design.parts):
             yield "drop", "strap", planned.name, _change_parts(plan, straps=others)
         if planned.readings < MOST_READINGS:
             again = replace(planned, readings=planned.readings + 1)

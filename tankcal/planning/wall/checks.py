@@ -281,7 +281,7 @@ def refuse_cut(design_tables, rows):
     design_tables: DesignTables; rows: {section: row of plan.toml}.
     """
     log = Log()
-    section = "hits" if design_tables.design.hits else "tangents"
+    section = design_tables.design.parts[0].section
     for name, place in design_tables.instrument_positions():
         why = message_of_obstacle_at(design_tables.obstacles, place)
         if why:

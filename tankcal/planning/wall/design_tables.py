@@ -242,9 +242,9 @@ class DesignTables:
 
     def _traverse_stations(self):
         """Yield (name, instrument position (3,)) of the stations of a traverse."""
-        ring = self.design.tangents
-        for k, turn in enumerate(_azimuths_of_ring(ring.start_deg, ring.stations), 1):
-            yield str(k), self._instrument_position(ring, turn)
+        for ring in filter(None, (self.design.tangents,)):
+            for k, turn in enumerate(_azimuths_of_ring(ring.start_deg, ring.stations), 1):
+                yield str(k), self._instrument_position(ring, turn)
 
     def _tangents(self):
         """Return readings of both limbs at each level, by station, with repetitions."""
@@ -277,12 +277,11 @@ class DesignTables:
         """Return (name, instrument position (3,)) of set-ups of hits and stations of tangents."""
         for ring, name, turn in self._setups_of_hits():
             yield name, np.append(self._ground_position(ring, turn), self.bottom_m + ring.height_m)
-        if self.design.tangents is not None:
-            yield from self._traverse_stations()
+        yield from self._traverse_stations()
 
     def cut_lines(self):
         """Return pairs of neighbouring traverse stations with an obstacle between them."""
-        stations = [] if self.design.tangents is None else list(self._traverse_stations())
+        stations = list(self._traverse_stations())
         for k, (name, station) in enumerate(stations):
             next_name, next_station = stations[(k + 1) % len(stations)]
             if not self._sees(station, next_station):

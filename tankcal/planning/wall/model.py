@@ -1,6 +1,8 @@
 """Data model of a planned survey of a bare wall: strapping, lines, hits, tangents, liquid."""
 
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import ClassVar
 
 import numpy as np
 
@@ -9,12 +11,44 @@ from tankcal.job.model import Job
 from tankcal.job.tables import RawJob, Value
 from tankcal.planning.model import Limits
 
+SECTIONS_OF_TRAVERSE = {  # sections of tables if limbs are sighted from traverse stations
+    "setups.csv": "tangents",
+    "control.csv": "tangents",
+    "directions.csv": "traverse",
+    "zenith_angles.csv": "traverse",
+    "slope_distances.csv": "traverse",
+    "stadia.csv": "traverse",
+}
 USUAL_AT = (20.0, 80.0)  # default heights of readings, percent of the height of a course
 SECONDS_PER_HIT = 10.0  # default time to aim, range and store
 
 
+class Part:
+    """A planned part of a `Design`: a strap, lines, a ring of set-ups, a traverse or a run.
+
+    Attributes
+    ----------
+    survey : str
+        Kind of survey that begins with this part, as in `tankcal new`.
+    section : str
+        Section of plan.toml.
+    datum : str or None
+        Default datum of the network of its set-ups.
+    is_wall : bool
+        Whether the part determines all courses of a wall without straps.
+    sections : dict
+        {table that the part generates: section of plan.toml}, where they differ from other parts.
+    """
+
+    survey = ""
+    section = ""
+    datum = None
+    is_wall = True
+    sections = MappingProxyType({})
+
+
 @dataclass(frozen=True)
-class PlannedStrap:
+class PlannedStrap(Part):
     """A strapped circumference of a course.
 
     at_percent is its height in percent of the height of the course; more holds {column: value} of
@@ -27,6 +61,10 @@ class PlannedStrap:
     readings: int = 1
     more: tuple = ()
 
+    survey: ClassVar = "strapping"
+    section: ClassVar = "straps"
+    is_wall: ClassVar = False
+
     @property
     def name(self):
         """Name, "COURSE-PERCENT"."""
@@ -34,7 +72,7 @@ class PlannedStrap:
 
 
 @dataclass(frozen=True)
-class PlannedLines:
+class PlannedLines(Part):
     """Reference lines, evenly round the tank, read at given percentages of course heights."""
 
     count: int
@@ -46,9 +84,13 @@ class PlannedLines:
     side: str = "outside"
     first_deg: float = 0.0
 
+    survey: ClassVar = "reference-line"
+    section: ClassVar = "lines"
+    is_wall: ClassVar = False
+
 
 @dataclass(frozen=True)
-class PlannedHits:
+class PlannedHits(Part):
     """A ring of set-ups, each of which hits the bare wall at some heights of some courses.
 
     spread_deg is the range of azimuths about the axis seen from a set-up; None: the whole visible
@@ -64,6 +106,9 @@ class PlannedHits:
     height_m: float = 1.6
     spread_deg: float | None = None
     instrument: str | None = None
+
+    survey: ClassVar = "wall-hits"
+    section: ClassVar = "hits"
 
 
 @dataclass(frozen=True)
@@ -86,7 +131,7 @@ class PlannedControl:
 
 
 @dataclass(frozen=True)
-class PlannedTangents:
+class PlannedTangents(Part):
     """A traverse round the tank with sights to both limbs at given heights of each course.
 
     Attributes
@@ -117,9 +162,14 @@ class PlannedTangents:
     readings: int = 1
     instrument: str | None = None
 
+    survey: ClassVar = "tangents"
+    section: ClassVar = "tangents"
+    datum: ClassVar = "minimal"
+    sections: ClassVar = MappingProxyType(SECTIONS_OF_TRAVERSE)
+
 
 @dataclass(frozen=True)
-class PlannedRun:
+class PlannedRun(Part):
     """A run of metered liquid from dip to dip.
 
     Attributes
@@ -139,6 +189,9 @@ class PlannedRun:
     meter: str | None = None
     sd_m: float | None = None
     celsius: float | None = None
+
+    survey: ClassVar = "liquid"
+    section: ClassVar = "runs"
 
     @property
     def batches(self):
@@ -190,6 +243,17 @@ class Design:
     tangents: PlannedTangents | None = None
     control: PlannedControl = PlannedControl()
     runs: tuple[PlannedRun, ...] = ()
+
+    @property
+    def parts(self):
+        """All parts; the first determines the kind of the survey."""
+        rings = (part for part in (self.tangents, self.lines) if part is not None)
+        return (*self.hits, *rings, *self.straps, *self.runs)
+
+    @property
+    def datum(self):
+        """Default of `adjustment.datum` for the network of the set-ups; None without a network."""
+        return self.parts[0].datum or (None if self.ties is None else "inner")
 
     @property
     def is_metered_alone(self):

@@ -40,14 +40,6 @@ SECTION_OF_TABLE = {  # tables that a design generates, and the section that mes
     "tangents.csv": "tangents",
     "liquid.csv": "runs",
 }
-SECTION_OF_TRAVERSE = {  # sections of tables if limbs are sighted from traverse stations
-    "setups.csv": "tangents",
-    "control.csv": "tangents",
-    "directions.csv": "traverse",
-    "zenith_angles.csv": "traverse",
-    "slope_distances.csv": "traverse",
-    "stadia.csv": "traverse",
-}
 
 
 def is_wall_plan(sections):
@@ -286,9 +278,8 @@ def job_of_design(raw, design, tank, expected, rows=None):
     """
     tables = DesignTables(design, *tank, bars=lengths_of_bars(raw)).tables()
     settings = dict(raw.settings)
-    datum = datum_of(design)
-    if datum is not None:
-        settings["adjustment"] = {"datum": Value(datum)} | settings.get("adjustment", {})
+    if design.datum is not None:
+        settings["adjustment"] = {"datum": Value(design.datum)} | settings.get("adjustment", {})
     whole = replace(raw, tables=raw.tables | tables, settings=settings)
     try:
         job = job_of(whole, Log())
@@ -296,13 +287,6 @@ def job_of_design(raw, design, tank, expected, rows=None):
         raise InputError(locate_in_plan(error.problems, design, rows)) from error
     job = set_nominal_readings(job, *expected)
     return replace(job, warnings=locate_in_plan(job.warnings, design, rows))
-
-
-def datum_of(design):
-    """Default of `adjustment.datum` for the network of a `Design`; None without a network."""
-    if design.tangents is not None:
-        return "minimal"
-    return None if design.ties is None else "inner"
 
 
 def locate_in_plan(problems, design, rows=None):
@@ -321,9 +305,7 @@ def locate_in_plan(problems, design, rows=None):
     tuple of Problem
         Without duplicates.
     """
-    section_of = SECTION_OF_TABLE
-    if design.tangents is not None:
-        section_of = SECTION_OF_TABLE | SECTION_OF_TRAVERSE
+    section_of = SECTION_OF_TABLE | design.parts[0].sections
     located = []
     for problem in problems:
         if problem.file in section_of:

@@ -11,7 +11,7 @@ from tankcal.job.starter import FilledForm, write_form
 from tankcal.messages import message
 from tankcal.planning.measurements import targets_of
 from tankcal.planning.model import TAPED
-from tankcal.planning.wall.reading import datum_of, tables_of
+from tankcal.planning.wall.reading import tables_of
 from tankcal.record.plan import PLAN, WALL_PLAN
 from tankcal.text.delimited import read_json
 from tankcal.text.shipped import DEFAULT
@@ -252,9 +252,8 @@ def _sd_of_sight(table, setup):
 def form_of_wall(plan):
     """Return the FilledForm of a WallPlan: a row for each reading, without its value."""
     design, settings = plan.design, _settings_of(plan.raw)
-    datum = datum_of(design)
-    if datum is not None:
-        settings.setdefault("adjustment.datum", datum)
+    if design.datum is not None:
+        settings.setdefault("adjustment.datum", design.datum)
     tables = {
         name: tuple(
             {
@@ -270,21 +269,12 @@ def form_of_wall(plan):
     return _form(
         plan,
         kind=plan.job.tank.kind,
-        survey=_kind_of_wall_survey(design),
+        survey=design.parts[0].survey,
         settings=settings,
         copied=COPIED_OF_WALL,
         tables=tables,
         more=tuple(tables),
     )
-
-
-def _kind_of_wall_survey(design):
-    """Kind of the survey of a `Design`, as in `tankcal new`."""
-    if design.is_metered_alone:
-        return "liquid"
-    if design.hits or design.tangents is not None:
-        return "wall-hits" if design.hits else "tangents"
-    return "strapping" if design.lines is None else "reference-line"
 
 
 def _runs(plan):

@@ -1,4 +1,4 @@
-"""Correction tables for trim and list of a ship's tank, with their uncertainty."""
+"""Tank inside a mesh, and the corrections of its soundings on a ship for trim and list."""
 
 from dataclasses import dataclass, replace
 from math import ceil, floor, tan
@@ -7,10 +7,11 @@ import numpy as np
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.pipeline.tanks import heeled_body
-from tankcal.pipeline.tanks.solid import ship_pipe
-from tankcal.tank.meshes import holds
-from tankcal.tank.ships import FULL, corrections_of, in_ship_frame
+from tankcal.pipeline.tanks.common import is_warmed, thermal_scale
+from tankcal.pipeline.tanks.solid import solid_body
+from tankcal.tank.body import SolidPart
+from tankcal.tank.meshes import holds, mesh_part
+from tankcal.tank.ships import FULL, Pipe, corrections_of, in_ship_frame, piped_mesh
 from tankcal.uncertainty import combine
 
 STEPS_M = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
@@ -67,10 +68,62 @@ class ShipTables:
     undeclared: tuple[str, ...]
 
 
+def part_of_mesh(job, mesh, switches, heel=(0.0, 0.0)):
+    """`SolidPart` that a mesh encloses; `heel` contains the tangents of trim and list of a ship.
+
+    Levels count from the dip plate or the lowest point; on a ship, along the pipe from its lower
+    end.
+    """
+    scale = thermal_scale(job, switches)
+    if job.ship is None:
+        zero = job.datum.dip_plate_z_m
+        if zero is None:
+            zero = job.datum.bottom_z_m
+        warmed = replace(mesh, vertices_m=scale * mesh.vertices_m)
+        solid = mesh_part(warmed, zero if zero is None else scale * zero)
+    else:
+        solid = _on_ship(job.ship, mesh, scale, heel)
+    return SolidPart(
+        solid,
+        scale,
+        job.material.expansion_per_k,
+        warmed=is_warmed(job, switches),
+        unused=("plate_thickness",),
+    )
+
+
+def ship_pipe(ship):
+    """`Pipe` of a `Ship` in the ship's frame."""
+    return Pipe(*in_ship_frame([ship.pipe_bottom_m, ship.pipe_top_m], ship.bow_azimuth_rad))
+
+
+def _on_ship(ship, mesh, scale, heel):
+    """Solid inside the mesh of a ship's tank, with levels along its pipe."""
+    contracted = None if ship.contraction is None else 1 - ship.contraction
+    return piped_mesh(
+        replace(mesh, vertices_m=in_ship_frame(mesh.vertices_m, ship.bow_azimuth_rad)),
+        ship_pipe(ship),
+        *heel,
+        scale=scale * (contracted or 1.0),
+        contracted=contracted,
+        marks_m=ship.length_between_marks_m,
+    )
+
+
+def heeled_body(job, survey, trim, list_):
+    """`Body` of a ship's tank at tangents of trim and list; levels are soundings along its pipe."""
+    part = part_of_mesh(job, survey, job.switches, (trim, list_))
+    return solid_body(job, survey, job.switches, part)
+
+
+def values_of_ship(ship):
+    """Even keel, position of the pipe in the ship's frame, and contraction."""
+    values = dict.fromkeys(("trim", "list", "pipe_x", "pipe_y", "pipe_lean"), 0.0)
+    return values if ship.contraction is None else {**values, "contraction": 100 * ship.contraction}
+
+
 def check_pipe(job, mesh):
     """Raise InputError for a pipe that does not open into the mesh or ends below its top."""
-    if job.ship is None:
-        return
     turned = in_ship_frame(mesh.vertices_m, job.ship.bow_azimuth_rad)
     pipe, problems = ship_pipe(job.ship), []
     ends = np.array([job.ship.pipe_bottom_m, job.ship.pipe_top_m], dtype=float)
@@ -163,8 +216,6 @@ def ship_tables(job, survey, body, table, progress=None):
 
 def undeclared_of_ship(job, survey):
     """Inputs without a standard uncertainty that affect corrections at largest trim and list."""
-    if job.ship is None:
-        return ()
     trim = max(job.ship.trim_m, key=abs) / job.ship.length_between_marks_m
     return heeled_body(job, survey, trim, tan(max(job.ship.list_rad, key=abs))).undeclared()
 
