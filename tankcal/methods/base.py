@@ -9,7 +9,7 @@ its own within the function that needs it, so that a job loads only the methods 
 """
 
 from collections import Counter
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 
 from tankcal.entry_points import find_entry_points
@@ -29,6 +29,23 @@ _BUILT_IN = (
     "tankcal.methods.inside_hits:InsideHitsMethod",
     "tankcal.methods.mesh:MeshMethod",
 )
+
+
+class Delegate:
+    """Hook of a method that is a function of a module, "module:function", imported when called."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def __get__(self, method, owner=None):
+        return _load(self.path)
+
+
+class Import(Delegate):
+    """Hook without arguments that returns a module, or an object of a module, "module:name"."""
+
+    def __get__(self, method, owner=None):
+        return partial(_load, self.path)
 
 
 class Method:
@@ -535,7 +552,7 @@ class Method:
 def methods():
     """All methods, each once: the methods of tankcal, then those of other distributions."""
     paths = (*_BUILT_IN, *find_entry_points(GROUP).values())
-    return tuple(_load(path) for path in paths)
+    return tuple(_load(path)() for path in paths)
 
 
 def methods_for(kind):
@@ -597,6 +614,7 @@ def completing_method(job):
 
 
 def _load(path):
-    """Method from "module:class"."""
+    """Module, or the object "module:name"."""
     module, _, name = path.partition(":")
-    return getattr(import_module(module), name)()
+    loaded = import_module(module)
+    return getattr(loaded, name) if name else loaded

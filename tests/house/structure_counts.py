@@ -94,6 +94,8 @@ def link_modules(modules):
                 wanted = [alias.name for alias in node.names]
             elif isinstance(node, ast.ImportFrom) and node.module:
                 wanted = [f"{node.module}.{alias.name}" for alias in node.names]
+            elif isinstance(node, ast.Call) and ast.unparse(node.func) in ("Delegate", "Import"):
+                wanted = [node.args[0].value.replace(":", ".")]  # a hook of a method
             else:
                 continue
             for target in wanted:  # a module, a package, or a name in one of the two

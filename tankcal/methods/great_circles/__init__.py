@@ -1,6 +1,6 @@
 """Strapping of a sphere: equator and meridians by tape, and the ellipsoid that they determine."""
 
-from tankcal.methods.base import Method
+from tankcal.methods.base import Delegate, Import, Method
 
 
 class GreatCirclesMethod(Method):
@@ -65,45 +65,26 @@ class GreatCirclesMethod(Method):
 
         return Surveyed(job, find_strapped_sphere(job, progress))
 
-    def inside_radii(self, job, survey):
-        from tankcal.methods.great_circles.sphere import inside_radii
-
-        return inside_radii(job, survey)
+    inside_radii = Delegate("tankcal.methods.great_circles.sphere:inside_radii")
 
     def solid_part(self, survey, plate_m, scale):
         return survey.solid(plate_m, scale), survey.arguments_of_part(plate_m, scale), ("offset",)
 
-    def warnings(self, job, survey, sights=None):
-        from tankcal.methods.great_circles.warnings import check_circles
-
-        return check_circles(job, survey)
+    warnings = Delegate("tankcal.methods.great_circles.warnings:check_circles")
 
     # ---- record
 
-    def saved_type(self):
-        from tankcal.methods.great_circles.saved import GreatCirclesRecord
-
-        return GreatCirclesRecord
-
-    def save(self, result):
-        from tankcal.methods.great_circles.saved import save_great_circles
-
-        return save_great_circles(result)
+    saved_type = Import("tankcal.methods.great_circles.saved:GreatCirclesRecord")
+    save = Delegate("tankcal.methods.great_circles.saved:save_great_circles")
 
     def choices(self, result):
         return {"survey": "great_circles", "between_sections": "ellipsoid"}
 
-    def sizes(self, result):
-        from tankcal.methods.great_circles.saved import sizes_inside
-
-        return sizes_inside(result)
+    sizes = Delegate("tankcal.methods.great_circles.saved:sizes_inside")
 
     # ---- report
 
-    def report_tables(self):
-        from tankcal.methods.great_circles import tables
-
-        return tables
+    report_tables = Import("tankcal.methods.great_circles.tables")
 
     def csv_tables(self, record):
         return {"great_circles": self.report_tables().CIRCLES}

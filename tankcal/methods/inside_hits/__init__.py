@@ -1,6 +1,6 @@
 """Wall hits inside horizontal tanks and spheres: distances of a total station to the bare wall."""
 
-from tankcal.methods.base import Method
+from tankcal.methods.base import Delegate, Import, Method
 
 
 class InsideHitsMethod(Method):
@@ -26,18 +26,12 @@ class InsideHitsMethod(Method):
 
     # ---- job
 
-    def columns(self):
-        from tankcal.methods.hits.columns import COLUMNS
-
-        return COLUMNS
+    columns = Import("tankcal.methods.hits.columns:COLUMNS")
 
     def starter_settings(self, kind):
         return {"survey.side": "inside"}
 
-    def check(self, values, tables, registers, raw, log):
-        from tankcal.methods.inside_hits.readings import check_inside_hits
-
-        check_inside_hits(values, tables, registers, raw, log)
+    check = Delegate("tankcal.methods.inside_hits.readings:check_inside_hits")
 
     def read(self, values, tables, registers, raw):
         from tankcal.methods.inside_hits.readings import make_inside_hits
@@ -55,32 +49,19 @@ class InsideHitsMethod(Method):
         )
         return Surveyed(job_of_points, scan, sights={self.name: sighting})
 
-    def warnings(self, job, survey, sights=None):
-        from tankcal.methods.inside_hits.warnings import check_hits_inside
-
-        return check_hits_inside(job, survey, sights)
+    warnings = Delegate("tankcal.methods.inside_hits.warnings:check_hits_inside")
 
     # ---- record
 
-    def saved_type(self):
-        from tankcal.methods.inside_hits.saved import InsideHitsRecord
-
-        return InsideHitsRecord
-
-    def save(self, result):
-        from tankcal.methods.inside_hits.saved import save_inside_hits
-
-        return save_inside_hits(result)
+    saved_type = Import("tankcal.methods.inside_hits.saved:InsideHitsRecord")
+    save = Delegate("tankcal.methods.inside_hits.saved:save_inside_hits")
 
     def choices(self, result):
         return {"survey": "wall_hits", "covariance": "hits"}
 
     # ---- report
 
-    def report_tables(self):
-        from tankcal.methods.inside_hits import tables
-
-        return tables
+    report_tables = Import("tankcal.methods.inside_hits.tables")
 
     def sheets(self, record):
         declared = self.report_tables()

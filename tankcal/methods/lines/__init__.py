@@ -1,6 +1,6 @@
 """Reference lines: offsets of the wall from vertical lines of sight, beside straps or points."""
 
-from tankcal.methods.base import Method
+from tankcal.methods.base import Delegate, Import, Method
 
 
 class LinesMethod(Method):
@@ -25,15 +25,8 @@ class LinesMethod(Method):
 
     # ---- job
 
-    def columns(self):
-        from tankcal.methods.lines.columns import COLUMNS
-
-        return COLUMNS
-
-    def settings(self):
-        from tankcal.methods.strapping.columns import KEYS
-
-        return KEYS
+    columns = Import("tankcal.methods.lines.columns:COLUMNS")
+    settings = Import("tankcal.methods.strapping.columns:KEYS")
 
     def starter_settings(self, kind):
         return {"survey.side": "outside", "datum.bottom_z_m": "0.0"}
@@ -45,10 +38,7 @@ class LinesMethod(Method):
             " repeated rows",
         }
 
-    def examples(self):
-        from tankcal.methods.lines.columns import EXAMPLES
-
-        return EXAMPLES
+    examples = Import("tankcal.methods.lines.columns:EXAMPLES")
 
     def is_given(self, tables):
         from tankcal.job.checking import has_rows
@@ -68,10 +58,7 @@ class LinesMethod(Method):
 
     # ---- known walls
 
-    def observe(self, job, wall, errors):
-        from tankcal.methods.lines.observed import observe_offsets
-
-        return observe_offsets(job, wall, errors)
+    observe = Delegate("tankcal.methods.lines.observed:observe_offsets")
 
     def levels_read(self, job):
         return {(offset.course, offset.level_m) for offset in job.lines.offsets}
@@ -95,25 +82,16 @@ class LinesMethod(Method):
     def courses_read(self, job):
         return {offset.course for offset in job.lines.offsets if not offset.check}
 
-    def warnings(self, job, survey, sights=None):
-        from tankcal.methods.lines.warnings import check_lines
-
-        return check_lines(job, survey)
+    warnings = Delegate("tankcal.methods.lines.warnings:check_lines")
 
     # ---- record
 
-    def saved_type(self):
-        from tankcal.methods.lines.saved import LinesRecord
-
-        return LinesRecord
+    saved_type = Import("tankcal.methods.lines.saved:LinesRecord")
 
     def is_saved(self, result):
         return result.job.lines is not None
 
-    def save(self, result):
-        from tankcal.methods.lines.saved import save_lines
-
-        return save_lines(result)
+    save = Delegate("tankcal.methods.lines.saved:save_lines")
 
     def choices(self, result):
         if result.strapped is None:
@@ -123,10 +101,7 @@ class LinesMethod(Method):
 
     # ---- report
 
-    def report_tables(self):
-        from tankcal.methods.lines import tables
-
-        return tables
+    report_tables = Import("tankcal.methods.lines.tables")
 
     def csv_tables(self, record):
         return {"offsets": self.report_tables().OFFSETS}

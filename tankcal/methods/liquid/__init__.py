@@ -1,6 +1,6 @@
 """Metered liquid: runs between dips, adjusted together with the geometry of the tank."""
 
-from tankcal.methods.base import Method
+from tankcal.methods.base import Delegate, Import, Method
 
 
 class LiquidMethod(Method):
@@ -23,15 +23,8 @@ class LiquidMethod(Method):
 
     # ---- job
 
-    def columns(self):
-        from tankcal.methods.liquid.columns import COLUMNS
-
-        return COLUMNS
-
-    def settings(self):
-        from tankcal.methods.liquid.columns import KEYS
-
-        return KEYS
+    columns = Import("tankcal.methods.liquid.columns:COLUMNS")
+    settings = Import("tankcal.methods.liquid.columns:KEYS")
 
     def register_fields(self):
         from tankcal.methods.liquid.columns import METER
@@ -54,15 +47,8 @@ class LiquidMethod(Method):
             " after it"
         }
 
-    def setting_examples(self):
-        from tankcal.methods.liquid.columns import SETTING_EXAMPLES
-
-        return SETTING_EXAMPLES
-
-    def examples(self):
-        from tankcal.methods.liquid.columns import EXAMPLES
-
-        return EXAMPLES
+    setting_examples = Import("tankcal.methods.liquid.columns:SETTING_EXAMPLES")
+    examples = Import("tankcal.methods.liquid.columns:EXAMPLES")
 
     def no_rows(self):
         from tankcal.messages import message
@@ -85,10 +71,7 @@ class LiquidMethod(Method):
 
             check_metering(values, tables, registers, raw, log)
 
-    def read(self, values, tables, registers, raw):
-        from tankcal.methods.liquid.readings import make_metering
-
-        return make_metering(values, tables, registers, raw)
+    read = Delegate("tankcal.methods.liquid.readings:make_metering")
 
     # ---- pipeline
 
@@ -108,59 +91,22 @@ class LiquidMethod(Method):
         progress(message("adjusting_liquid", "adjusting the runs by liquid with the geometry"))
         return measure_by_liquid(job, survey)
 
-    def warnings(self, job, survey, sights=None):
-        from tankcal.methods.liquid.warnings import check_liquid
-
-        return check_liquid(job, survey)
+    warnings = Delegate("tankcal.methods.liquid.warnings:check_liquid")
 
     # ---- record
 
-    def saved_type(self):
-        from tankcal.methods.liquid.saved import LiquidRecord
-
-        return LiquidRecord
-
-    def save(self, result):
-        from tankcal.methods.liquid.saved import save_liquid
-
-        return save_liquid(result)
-
-    def choices(self, result):
-        from tankcal.methods.liquid.saved import choices_of
-
-        return choices_of(result)
+    saved_type = Import("tankcal.methods.liquid.saved:LiquidRecord")
+    save = Delegate("tankcal.methods.liquid.saved:save_liquid")
+    choices = Delegate("tankcal.methods.liquid.saved:choices_of")
 
     # ---- report
 
-    def report_tables(self):
-        from tankcal.methods.liquid import tables
-
-        return tables
-
-    def report_figures(self):
-        from tankcal.methods.liquid import figures
-
-        return figures
-
-    def facts(self):
-        from tankcal.methods.liquid.facts import FACTS
-
-        return FACTS
-
-    def unchecked(self, paper):
-        from tankcal.methods.liquid.facts import hidden_errors
-
-        return hidden_errors(paper)
-
-    def field_blocks(self, paper, texts):
-        from tankcal.methods.liquid.field_sheets import blocks_of_liquid
-
-        return blocks_of_liquid(paper, texts)
-
-    def field_columns(self, paper, columns):
-        from tankcal.methods.liquid.field_sheets import columns_of_batches
-
-        return columns_of_batches(paper, columns)
+    report_tables = Import("tankcal.methods.liquid.tables")
+    report_figures = Import("tankcal.methods.liquid.figures")
+    facts = Import("tankcal.methods.liquid.facts:FACTS")
+    unchecked = Delegate("tankcal.methods.liquid.facts:hidden_errors")
+    field_blocks = Delegate("tankcal.methods.liquid.field_sheets:blocks_of_liquid")
+    field_columns = Delegate("tankcal.methods.liquid.field_sheets:columns_of_batches")
 
     def csv_tables(self, record):
         return {"liquid_steps": self.report_tables().STEPS}

@@ -1,6 +1,6 @@
 """A tank as a closed mesh; on a ship, sounded through a pipe at any trim and list."""
 
-from tankcal.methods.base import Method
+from tankcal.methods.base import Delegate, Method
 
 
 class MeshMethod(Method):
@@ -49,10 +49,7 @@ class MeshMethod(Method):
             check_pipe(job, mesh)
         return Surveyed(job, mesh)
 
-    def part(self, job, survey, switches):
-        from tankcal.methods.mesh.ship import part_of_mesh
-
-        return part_of_mesh(job, survey, switches)
+    part = Delegate("tankcal.methods.mesh.ship:part_of_mesh")
 
     def input_values(self, job):
         from tankcal.methods.mesh.ship import values_of_ship

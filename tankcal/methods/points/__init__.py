@@ -1,6 +1,6 @@
 """Points of the wall: as given, or from the adjustment of a network."""
 
-from tankcal.methods.base import Method
+from tankcal.methods.base import Import, Method
 
 
 class PointsMethod(Method):
@@ -22,10 +22,7 @@ class PointsMethod(Method):
     def table_notes(self):
         return {"points": "one row for each surveyed point of the wall"}
 
-    def examples(self):
-        from tankcal.methods.points.columns import EXAMPLES
-
-        return EXAMPLES
+    examples = Import("tankcal.methods.points.columns:EXAMPLES")
 
     def check(self, values, tables, registers, raw, log):
         from tankcal.methods.points.readings import check_points_of

@@ -1,6 +1,6 @@
 """Radii of the courses by a former table, a record or a declaration, alone or with a survey."""
 
-from tankcal.methods.base import Method
+from tankcal.methods.base import Delegate, Import, Method
 
 
 class RadiiMethod(Method):
@@ -21,15 +21,8 @@ class RadiiMethod(Method):
 
     # ---- job
 
-    def columns(self):
-        from tankcal.methods.radii.columns import COLUMNS
-
-        return COLUMNS
-
-    def settings(self):
-        from tankcal.methods.radii.columns import KEYS
-
-        return KEYS
+    columns = Import("tankcal.methods.radii.columns:COLUMNS")
+    settings = Import("tankcal.methods.radii.columns:KEYS")
 
     def starter_settings(self, kind):
         return {"survey.side": "inside", "datum.bottom_z_m": "0.0"}
@@ -45,10 +38,7 @@ class RadiiMethod(Method):
         note = "one row for each course, with its radius as a former table or a record has it"
         return {"radii": note}
 
-    def setting_examples(self):
-        from tankcal.methods.radii.columns import SETTING_EXAMPLES
-
-        return SETTING_EXAMPLES
+    setting_examples = Import("tankcal.methods.radii.columns:SETTING_EXAMPLES")
 
     def examples(self):
         from tankcal.methods.radii.columns import EXAMPLES
@@ -65,10 +55,7 @@ class RadiiMethod(Method):
 
         check_radii(values, tables, raw, log)
 
-    def useless_inputs(self, values, tables):
-        from tankcal.methods.radii.readings import useless_inputs
-
-        return useless_inputs(values, tables)
+    useless_inputs = Delegate("tankcal.methods.radii.readings:useless_inputs")
 
     def read(self, values, tables, registers, raw):
         from tankcal.methods.radii.readings import make_radii
@@ -86,10 +73,7 @@ class RadiiMethod(Method):
 
         return Surveyed(job, find_radii_wall(job, progress))
 
-    def complete(self, job, survey, progress):
-        from tankcal.methods.radii.update import update_by_survey
-
-        return update_by_survey(job, survey, progress)
+    complete = Delegate("tankcal.methods.radii.update:update_by_survey")
 
     def former_radii_m(self, job):
         import numpy as np
@@ -97,10 +81,7 @@ class RadiiMethod(Method):
         nominal_m = job.tank.nominal_diameter_m / 2
         return np.where(job.radii.is_known, job.radii.radius_m, nominal_m)
 
-    def job_as_surveyed(self, job):
-        from tankcal.methods.radii.wall import job_as_declared
-
-        return job_as_declared(job)
+    job_as_surveyed = Delegate("tankcal.methods.radii.wall:job_as_declared")
 
     def inside_radii(self, job, survey):
         from tankcal.pipeline.checks.size import radii_of_courses
@@ -109,32 +90,14 @@ class RadiiMethod(Method):
 
     # ---- record
 
-    def saved_type(self):
-        from tankcal.methods.radii.saved import RadiiRecord
-
-        return RadiiRecord
-
-    def save(self, result):
-        from tankcal.methods.radii.saved import save_radii
-
-        return save_radii(result)
-
-    def choices(self, result):
-        from tankcal.methods.radii.saved import choices_of
-
-        return choices_of(result)
+    saved_type = Import("tankcal.methods.radii.saved:RadiiRecord")
+    save = Delegate("tankcal.methods.radii.saved:save_radii")
+    choices = Delegate("tankcal.methods.radii.saved:choices_of")
 
     # ---- report
 
-    def report_tables(self):
-        from tankcal.methods.radii import tables
-
-        return tables
-
-    def report_figures(self):
-        from tankcal.methods.radii import figures
-
-        return figures
+    report_tables = Import("tankcal.methods.radii.tables")
+    report_figures = Import("tankcal.methods.radii.figures")
 
     def sheets(self, record):
         return [("radii", "radii_subtitle", [("radii", self.report_tables().RADII)])]

@@ -1,6 +1,6 @@
 """Strapped rings of a horizontal cylinder: circumferences by tape, ring by ring."""
 
-from tankcal.methods.base import Method
+from tankcal.methods.base import Delegate, Import, Method
 
 
 class RingsMethod(Method):
@@ -28,20 +28,9 @@ class RingsMethod(Method):
     def table_notes(self):
         return {"rings": "one row for each ring (of plates) of the cylinder, from end A to end B"}
 
-    def examples(self):
-        from tankcal.methods.rings.columns import EXAMPLES
-
-        return EXAMPLES
-
-    def check(self, values, tables, registers, raw, log):
-        from tankcal.methods.rings.readings import check_rings
-
-        check_rings(values, tables, registers, raw, log)
-
-    def estimate_diameter_m(self, tables):
-        from tankcal.methods.rings.readings import estimate_diameter_m
-
-        return estimate_diameter_m(tables)
+    examples = Import("tankcal.methods.rings.columns:EXAMPLES")
+    check = Delegate("tankcal.methods.rings.readings:check_rings")
+    estimate_diameter_m = Delegate("tankcal.methods.rings.readings:estimate_diameter_m")
 
     def read(self, values, tables, registers, raw):
         from tankcal.methods.rings.readings import make_rings
@@ -59,20 +48,9 @@ class RingsMethod(Method):
 
         return Surveyed(job, find_ringed_wall(job, progress, network.amplitudes))
 
-    def inside_radii(self, job, survey):
-        from tankcal.methods.rings.wall import inside_radii
-
-        return inside_radii(job, survey)
-
-    def part(self, job, survey, switches):
-        from tankcal.methods.rings.wall import ringed_part
-
-        return ringed_part(job, survey, switches)
-
-    def warnings(self, job, survey, sights=None):
-        from tankcal.methods.rings.warnings import check_rings
-
-        return check_rings(job, survey)
+    inside_radii = Delegate("tankcal.methods.rings.wall:inside_radii")
+    part = Delegate("tankcal.methods.rings.wall:ringed_part")
+    warnings = Delegate("tankcal.methods.rings.warnings:check_rings")
 
     # ---- record
 

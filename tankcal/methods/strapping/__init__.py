@@ -1,6 +1,6 @@
 """Strapping: circumferences by tape of an upright tank, alone or beside points of its wall."""
 
-from tankcal.methods.base import Method
+from tankcal.methods.base import Delegate, Import, Method
 
 
 class StrappingMethod(Method):
@@ -32,15 +32,8 @@ class StrappingMethod(Method):
 
     # ---- job
 
-    def columns(self):
-        from tankcal.methods.strapping.columns import COLUMNS
-
-        return COLUMNS
-
-    def settings(self):
-        from tankcal.methods.strapping.columns import KEYS
-
-        return KEYS
+    columns = Import("tankcal.methods.strapping.columns:COLUMNS")
+    settings = Import("tankcal.methods.strapping.columns:KEYS")
 
     def starter_settings(self, kind):
         return {"survey.side": "outside", "datum.bottom_z_m": "0.0"}
@@ -61,15 +54,8 @@ class StrappingMethod(Method):
             " stay empty",
         }
 
-    def setting_examples(self):
-        from tankcal.methods.strapping.columns import SETTING_EXAMPLES
-
-        return SETTING_EXAMPLES
-
-    def examples(self):
-        from tankcal.methods.strapping.columns import EXAMPLES
-
-        return EXAMPLES
+    setting_examples = Import("tankcal.methods.strapping.columns:SETTING_EXAMPLES")
+    examples = Import("tankcal.methods.strapping.columns:EXAMPLES")
 
     def no_rows(self):
         from tankcal.messages import message
@@ -91,10 +77,7 @@ class StrappingMethod(Method):
 
     # ---- known walls
 
-    def observe(self, job, wall, errors):
-        from tankcal.methods.strapping.readings import observe_straps
-
-        return observe_straps(job, wall, errors)
+    observe = Delegate("tankcal.methods.strapping.readings:observe_straps")
 
     def levels_read(self, job):
         return {(strap.course, strap.level_m) for strap in job.strapping.straps}
@@ -125,42 +108,22 @@ class StrappingMethod(Method):
     def courses_read(self, job):
         return {strap.course for strap in job.strapping.straps if not strap.check}
 
-    def inside_radii(self, job, survey):
-        from tankcal.methods.strapping.wall import inside_radii
-
-        return inside_radii(job, survey)
-
-    def warnings(self, job, survey, sights=None):
-        from tankcal.methods.strapping.warnings import check_strapping
-
-        return check_strapping(job, survey)
+    inside_radii = Delegate("tankcal.methods.strapping.wall:inside_radii")
+    warnings = Delegate("tankcal.methods.strapping.warnings:check_strapping")
 
     # ---- record
 
-    def saved_type(self):
-        from tankcal.methods.strapping.saved import StrappingRecord
-
-        return StrappingRecord
+    saved_type = Import("tankcal.methods.strapping.saved:StrappingRecord")
 
     def is_saved(self, result):
         return result.straps is not None
 
-    def save(self, result):
-        from tankcal.methods.strapping.saved import save_strapping
-
-        return save_strapping(result)
-
-    def choices(self, result):
-        from tankcal.methods.strapping.saved import choices_of
-
-        return choices_of(result)
+    save = Delegate("tankcal.methods.strapping.saved:save_strapping")
+    choices = Delegate("tankcal.methods.strapping.saved:choices_of")
 
     # ---- report
 
-    def report_tables(self):
-        from tankcal.methods.strapping import tables
-
-        return tables
+    report_tables = Import("tankcal.methods.strapping.tables")
 
     def csv_tables(self, record):
         return {"strapping": self.report_tables().straps_of(record)}

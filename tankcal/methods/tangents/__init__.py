@@ -1,6 +1,6 @@
 """Tangents: sights to both limbs of an upright tank, from a traverse round it."""
 
-from tankcal.methods.base import Method
+from tankcal.methods.base import Delegate, Import, Method
 
 
 class TangentsMethod(Method):
@@ -61,10 +61,7 @@ class TangentsMethod(Method):
 
     # ---- known walls
 
-    def observe(self, job, wall, errors):
-        from tankcal.methods.tangents.observed import observe_tangents
-
-        return observe_tangents(job, wall, errors)
+    observe = Delegate("tankcal.methods.tangents.observed:observe_tangents")
 
     def levels_read(self, job):
         tangents = job.tangents
@@ -92,32 +89,19 @@ class TangentsMethod(Method):
         )
         return Surveyed(job_of_points, wall, sights={"tangents": touching})
 
-    def warnings(self, job, survey, sights=None):
-        from tankcal.methods.tangents.warnings import check_tangents
-
-        return check_tangents(job, survey, sights)
+    warnings = Delegate("tankcal.methods.tangents.warnings:check_tangents")
 
     # ---- record
 
-    def saved_type(self):
-        from tankcal.methods.tangents.saved import TangentsRecord
-
-        return TangentsRecord
-
-    def save(self, result):
-        from tankcal.methods.tangents.saved import save_tangents
-
-        return save_tangents(result)
+    saved_type = Import("tankcal.methods.tangents.saved:TangentsRecord")
+    save = Delegate("tankcal.methods.tangents.saved:save_tangents")
 
     def choices(self, result):
         return {"survey": "tangents", "covariance": "tangents"}
 
     # ---- report
 
-    def report_tables(self):
-        from tankcal.methods.tangents import tables
-
-        return tables
+    report_tables = Import("tankcal.methods.tangents.tables")
 
     def sheets(self, record):
         declared = self.report_tables()
