@@ -13,7 +13,7 @@ import time
 import pytest
 
 from tankcal.cli import main
-from tankcal.products.app import shortcuts
+from tankcal.products.app import command as shortcuts
 
 
 @pytest.mark.parametrize("system", ["linux", "darwin"])

@@ -17,7 +17,7 @@ from tankcal.products.desk.result_pages import wall_page
 from tankcal.products.workbench.views import page as pages
 from tankcal.products.workbench.views import results_view
 from tankcal.products.workbench.views.page import Calculator, SavedView, parse_number
-from tankcal.products.workbench.views.what_if import budget_sentences, change_budget, table_html
+from tankcal.products.workbench.views.panels import budget_sentences, change_budget, table_html
 from tankcal.record import record_of
 from tankcal.report.paper import Paper
 from tankcal.report.tables.capacity import capacity_rows, capacity_table
@@ -319,7 +319,7 @@ def test_picture_and_list_look_at_the_same_point(widgets, result, english):
 
 
 def test_sliders_of_the_budget(widgets, result, paper):
-    from tankcal.products.workbench.views.what_if import BudgetPanel
+    from tankcal.products.workbench.views.panels import BudgetPanel
 
     panel = BudgetPanel(result, paper)
     before = panel.totals.value

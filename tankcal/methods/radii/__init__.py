@@ -97,7 +97,7 @@ class RadiiMethod(Method):
     # ---- report
 
     report_tables = Import("tankcal.methods.radii.tables")
-    report_figures = Import("tankcal.methods.radii.figures")
+    report_figures = Import("tankcal.methods.radii.tables")
 
     def sheets(self, record):
         return [("radii", "radii_subtitle", [("radii", self.report_tables().RADII)])]

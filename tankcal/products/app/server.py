@@ -22,23 +22,21 @@ from starlette.responses import (
 from starlette.routing import Mount, Route
 
 from tankcal.errors import InputError, TankcalError
-from tankcal.products.app.drop_pages import (
-    compare_upload,
-    open_sent_job,
-    show_upload,
-    view_record,
-)
 from tankcal.products.app.folders import pack_sent_folder
 from tankcal.products.app.guard import LANGUAGE_COOKIE, REPORT_POLICY
 from tankcal.products.app.office_pages import (
+    compare_upload,
     create_from_chart,
     draw_chart,
     end_session,
+    open_sent_job,
     send_register,
     show_chart,
     show_login,
     show_register,
+    show_upload,
     start_session,
+    view_record,
     withdraw_certificate,
 )
 from tankcal.products.app.pages import (

@@ -2,12 +2,15 @@
 
 import asyncio
 from html import escape
+from pathlib import Path
 
+import anywidget
 import ipywidgets as widgets
+import traitlets
 
+import tankcal.products.desk
 from tankcal.errors import InputError, TankcalError, reason_of
 from tankcal.products.desk.computing import Refusal
-from tankcal.products.workbench.grid import Grid
 from tankcal.products.workbench.pages import warnings_page
 from tankcal.record import record_of
 
@@ -294,3 +297,36 @@ class ResultsPanel:
         """Show a message below the buttons; red by default."""
         lines = "".join(f"<div>{escape(line)}</div>" for line in text.splitlines())
         self.state.value = f'<div style="color: {colour}">{lines}</div>' if lines else ""
+
+
+# ---- grid: a table of a job as a widget of JupyterLab (anywidget)
+
+
+FOLDER = Path(tankcal.products.desk.__file__).parent
+
+
+class Grid(anywidget.AnyWidget):
+    """An editable table; `on_msg` passes on the actions of the user.
+
+    `put` changes rows in place and sends only the changed cells. A view that is opened later gets
+    the current rows.
+    """
+
+    _esm = FOLDER / "grid.js"
+    _css = FOLDER / "grid.css"
+    name = traitlets.Unicode().tag(sync=True)
+    label = traitlets.Unicode().tag(sync=True)
+    columns = traitlets.List().tag(sync=True)
+    rows = traitlets.List().tag(sync=True)
+    marks = traitlets.List().tag(sync=True)
+    addable = traitlets.List().tag(sync=True)
+    words = traitlets.Dict().tag(sync=True)
+    takes_rows = traitlets.Bool().tag(sync=True)
+    every_key = traitlets.Bool().tag(sync=True)
+    locked = traitlets.Bool().tag(sync=True)
+
+    def put(self, cells):
+        """Show new texts in cells, [(row, column, text)]."""
+        for row, column, text in cells:
+            self.rows[row][column] = text
+        self.send({"kind": "cells", "cells": [list(cell) for cell in cells]})
