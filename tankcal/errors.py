@@ -200,10 +200,6 @@ def problem_from(plain):
     ----------
     plain : dict
         Result of `problem_of`.
-
-    Returns
-    -------
-    Problem
     """
     # Records without a code contain a text that is not translated.
     text = plain["text"]

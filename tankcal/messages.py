@@ -44,10 +44,6 @@ def message(code, template, **values):
     **values
         Values of the template.
 
-    Returns
-    -------
-    Message
-
     Examples
     --------
     >>> message("known_to", "known to {sd_mm:.1f} mm", sd_mm=0.52)

@@ -109,10 +109,6 @@ def _make_interior(adjustment, setups, number, photos, is_part, has_others):
         Whether the camera has other sets.
     has_others : bool
         Whether the adjustment has other sets.
-
-    Returns
-    -------
-    Interior
     """
     adjusted = adjustment.adjusted
     camera = adjusted.survey.cameras[number]

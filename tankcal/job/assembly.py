@@ -195,10 +195,6 @@ def make_job(raw, values, tables, attached, measurements, warnings):
         Survey to be adjusted.
     warnings : tuple of Problem
         Warnings of all checks.
-
-    Returns
-    -------
-    Job
     """
     kind, within_mm = values["tank"]["kind"], values["checks"]["diameter_within_mm"]
     has_points = has_rows(tables["points"]) or measurements is not None
@@ -240,10 +236,6 @@ def make_frame(raw, values, tables, measurements, warnings, has_points=True):
         As for `make_job`.
     has_points : bool, optional
         True if the job has points or a survey.
-
-    Returns
-    -------
-    Job
     """
     adjustment, kind = values["adjustment"], values["tank"]["kind"]
     return Job(

@@ -196,10 +196,6 @@ def make_camera(name, given, settings, weights="measured"):
         {key: value} of [adjustment.camera].
     weights : str, optional
         Weights of image coordinates, as in `camera.model.Form`.
-
-    Returns
-    -------
-    CameraSetup
     """
     parameters = parameters_of(given, settings)
     form = Form(

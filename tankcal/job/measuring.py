@@ -39,10 +39,6 @@ def make_measurements(values, tables, registers):
         Tables by name.
     registers : dict
         {"cameras" or "instruments": {name: {key: value}}}.
-
-    Returns
-    -------
-    Measurements
     """
     weights = values["adjustment"]["image_weights"] or "measured"
     cameras = tuple(

@@ -88,10 +88,6 @@ def effect_of(job, surveyed, volume_m3, level_m, progress):
         Volume of the top row of the table, and its level in the frame of the parts.
     progress : callable
         Called with a line of text as each step begins.
-
-    Returns
-    -------
-    Overrulings or None
     """
     decisions = job.overrulings
     if not decisions:

@@ -110,10 +110,6 @@ def scanned_wall(job, fitted, chosen, covariance_m2, dof):
         Covariance or variances of these points, m2.
     dof : float
         Degrees of freedom of the covariance.
-
-    Returns
-    -------
-    ScannedWall
     """
     solid = solid_as_surveyed(job, fitted.names, fitted.values)
     readings = _readings(job, fitted.fit, chosen, covariance_m2)
@@ -188,7 +184,14 @@ def agreeing(job, fit, chosen, covariance_m2, limit, kept):
     index = np.flatnonzero(chosen)
     for _ in range(MOST_ROUNDS):
         if len(index) > MOST_SITES:
-            outliers = _unlike_neighbours(job, fit, index, limit)
+            # Indices of points far from the median of their neighbours.
+            xyz = job.points.xyz_m[index]
+            distance = offsets(fit, xyz)
+            neighbours = scipy.spatial.KDTree(xyz).query(xyz, NEIGHBOURS + 1)[1][:, 1:]
+            deviation = np.abs(distance - np.median(distance[neighbours], axis=1))
+            outliers = np.flatnonzero(
+                deviation > max(limit * SD_OVER_MEDIAN * np.median(deviation), DENT_M)
+            )
         else:
             readings = _readings(job, fit, index, covariance_m2(index))
             outliers = _field(readings, noise_is_estimated(job)).far_off(limit, DENT_M)
@@ -197,15 +200,6 @@ def agreeing(job, fit, chosen, covariance_m2, limit, kept):
             break
         index = np.delete(index, outliers)
     return np.isin(np.arange(len(chosen)), index)
-
-
-def _unlike_neighbours(job, fit, index, limit):
-    """Indices of points far from the median of their neighbours."""
-    xyz = job.points.xyz_m[index]
-    distance = offsets(fit, xyz)
-    neighbours = scipy.spatial.KDTree(xyz).query(xyz, NEIGHBOURS + 1)[1][:, 1:]
-    deviation = np.abs(distance - np.median(distance[neighbours], axis=1))
-    return np.flatnonzero(deviation > max(limit * SD_OVER_MEDIAN * np.median(deviation), DENT_M))
 
 
 def offsets(fit, xyz_m):
@@ -241,10 +235,6 @@ def _readings(job, fit, chosen, covariance_m2):
         Indices of the accepted points.
     covariance_m2 : ndarray, shape (3m, 3m) or (3m,)
         Covariance or variances of these points, m2.
-
-    Returns
-    -------
-    _Readings
     """
     xyz = job.points.xyz_m[chosen]
     means = means_of_neighbours(xyz)
@@ -390,10 +380,6 @@ def fit_scan(job, dof=np.inf):
     job : Job
     dof : float
         Degrees of freedom of the covariance of the points, if supplied.
-
-    Returns
-    -------
-    Scan
 
     Raises
     ------

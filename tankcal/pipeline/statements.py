@@ -172,10 +172,6 @@ def stated_volume(table, intervals, height_m):
     height_m : float
         Dip, m.
 
-    Returns
-    -------
-    Quantity
-
     Raises
     ------
     HeightError
@@ -204,10 +200,6 @@ def stated_delivery(table, simulation, low_m, high_m):
     simulation : simulation.TableSimulation or None
     low_m, high_m : float
         Dips, m.
-
-    Returns
-    -------
-    Quantity
 
     Raises
     ------
@@ -249,10 +241,6 @@ def verdict_of(job, body, table, intervals, simulation):
     intervals : simulation.Intervals
         Intervals of the rows.
     simulation : simulation.TableSimulation or None
-
-    Returns
-    -------
-    RuleVerdict or None
     """
     if job.rule is None:
         return None

@@ -98,10 +98,6 @@ def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=N
     cluster, part_progress : optional
         Workers that read large files, and callback for their progress; as in `chain.run`.
 
-    Returns
-    -------
-    Surveyed
-
     Raises
     ------
     InputError, SolutionError

@@ -174,10 +174,6 @@ def field_of_readings(sites, readings, noise_m2, nominal_m, amplitudes=None):
         Nominal radius, m.
     amplitudes : Amplitudes, optional
         None: estimated from the readings.
-
-    Returns
-    -------
-    WallField
     """
     radius = np.array([reading.radius_m for reading in readings])
     by_lines = any(reading.of == "offsets" for reading in readings)

@@ -381,10 +381,6 @@ def _straps_of(job, read, taped, inner_m):
         Reduced circumferences, `AreaTerm`, and the standard deviation of the shape, m.
     inner_m : ndarray, shape (courses,)
         Plate and paint between the surface of the points and the outside, m.
-
-    Returns
-    -------
-    Straps
     """
     reduced, term, shape = taped
     is_strap, tested = read.are("straps"), read.tested

@@ -50,10 +50,6 @@ def assemble_plan(job, plan_input, bars, folder):
         {name: {key: value}} of the stadias in the instruments of the job.
     folder : str
         Name of the folder of the plan.
-
-    Returns
-    -------
-    Plan
     """
     pattern = plan_input.sections["pattern"]
     shell = shell_of(job, pattern)

@@ -52,10 +52,6 @@ def place_of(plan, xyz_m):
     plan : Plan
     xyz_m : array_like, shape (3,)
         Coordinates in the frame of the survey, m.
-
-    Returns
-    -------
-    Place
     """
     shell = plan.shell
     east, north = xyz_m[:2] - shell.axis_m

@@ -446,7 +446,10 @@ def _explain_unreadable_bar(plan, base):
     here, there = plan.points[base.setup], plan.points[base.to]
     if not find_in_sight(plan, here, there[None], np.full((1, 3), np.nan))[0]:
         return message_of_cut_line(base.setup, base.to)
-    ends = _ends(here, there, length)
+    # Horizontal positions (2, 2) of the ends of a bar over a station, square to the sight.
+    east, north = (there - here)[:2] / np.hypot(*(there - here)[:2])
+    half = length / 2 * np.array([north, -east])
+    ends = there[:2] + np.array([half, -half])
     off = np.hypot(*(ends - plan.shell.axis_m).T) - plan.shell.radius_m
     is_level = plan.shell.low_m <= there[2] <= plan.shell.high_m
     if is_level and (off < GRAZE_M if plan.shell.is_outside else off > -GRAZE_M).any():
@@ -458,13 +461,6 @@ def _explain_unreadable_bar(plan, base):
             other=base.to,
         )
     return ""
-
-
-def _ends(here, there, length_m):
-    """Horizontal positions (2, 2) of the ends of a bar over a station, square to the sight."""
-    east, north = (there - here)[:2] / np.hypot(*(there - here)[:2])
-    half = length_m / 2 * np.array([north, -east])
-    return there[:2] + np.array([half, -half])
 
 
 # ---- obstacles and tapes
@@ -480,7 +476,16 @@ def _warn_of_places(plan, plan_input, log):
         low, high = (float(np.ravel(end)[-1]) for end in (obstacle.low_m, obstacle.high_m))
         away = _distance_to_wall_m(obstacle, shell)
         if away > FAR_M or low > max(heights) or high < min(heights):
-            far.append(_describe_obstacle(obstacle.name, away, low, high))
+            far.append(
+                message(
+                    "plan_obstacle_place",
+                    "{obstacle} ({away_m:.6g} m from the wall, z {low_m:.6g} to {high_m:.6g} m)",
+                    obstacle=obstacle.name,
+                    away_m=away,
+                    low_m=low,
+                    high_m=high,
+                )
+            )
     if far:
         text = message(
             "plan_obstacles_far",
@@ -493,17 +498,6 @@ def _warn_of_places(plan, plan_input, log):
         log.warning(PLAN_FILE, text, plan_input.sections["obstacles"][0].row, "obstacles")
     for entry in plan_input.sections["tapes"]:
         _warn_of_tape(plan, entry, log)
-
-
-def _describe_obstacle(name, away_m, low_m, high_m):
-    return message(
-        "plan_obstacle_place",
-        "{obstacle} ({away_m:.6g} m from the wall, z {low_m:.6g} to {high_m:.6g} m)",
-        obstacle=name,
-        away_m=away_m,
-        low_m=low_m,
-        high_m=high_m,
-    )
 
 
 def _distance_to_wall_m(obstacle, shell):

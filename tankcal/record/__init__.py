@@ -145,10 +145,6 @@ def content_error(file, error):
         Name of the record.
     error : Exception
         LookupError, TypeError, ValueError or AttributeError raised by the content.
-
-    Returns
-    -------
-    InputError
     """
     expected = message(
         "no_record",

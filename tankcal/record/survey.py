@@ -230,7 +230,9 @@ def rejections_of(result):
         w, reason = residual_m / result.scan.noise_m, ["far_off"] * len(points.names)
     else:
         return []
-    target_rows = _target_rows(result.job)
+    # Row of targets.csv of each target; targets used with hits have no row in the hits' file.
+    targets = None if result.job.measurements is None else result.job.measurements.targets
+    target_rows = {} if targets is None else dict(zip(targets.point, targets.rows, strict=False))
     return [
         RejectedPoint(
             points.names[i], *points.xyz_m[i], residual_m[i], w[i], reason[i],
@@ -238,12 +240,6 @@ def rejections_of(result):
         )
         for i in rejected
     ]  # fmt: skip
-
-
-def _target_rows(job):
-    """Return {target: row of targets.csv}; targets used with hits have no row in the hits' file."""
-    targets = None if job.measurements is None else job.measurements.targets
-    return {} if targets is None else dict(zip(targets.point, targets.rows, strict=False))
 
 
 # ---- sections

@@ -151,7 +151,15 @@ def execute(notebook, folder, on_cell=None, **objects):
             cell["execution_count"] = count
         if on_cell:
             on_cell(number)
-    notebook["metadata"]["language_info"] = _language_info()
+    notebook["metadata"]["language_info"] = {
+        "codemirror_mode": {"name": "ipython", "version": sys.version_info.major},
+        "file_extension": ".py",
+        "mimetype": "text/x-python",
+        "name": "python",
+        "nbconvert_exporter": "python",
+        "pygments_lexer": "ipython3",
+        "version": ".".join(map(str, sys.version_info[:3])),
+    }
     return notebook
 
 
@@ -189,19 +197,6 @@ def _bundle(value):
     if hasattr(value, "_repr_mimebundle_"):
         return value._repr_mimebundle_()
     return {"text/plain": repr(value)}
-
-
-def _language_info():
-    """Return the language metadata of a Python kernel."""
-    return {
-        "codemirror_mode": {"name": "ipython", "version": sys.version_info.major},
-        "file_extension": ".py",
-        "mimetype": "text/x-python",
-        "name": "python",
-        "nbconvert_exporter": "python",
-        "pygments_lexer": "ipython3",
-        "version": ".".join(map(str, sys.version_info[:3])),
-    }
 
 
 def notebook_text(notebook):

@@ -129,7 +129,14 @@ def _compile(files, timestamp):
     """
     return_freed_memory()  # the typesetter cannot use memory that Python has freed but keeps
     with TemporaryDirectory(prefix="tankcal-page-") as folder:
-        _copy_fonts(folder)
+        # Copy the fonts of the figures from matplotlib, except its fallback font.
+        # The import of matplotlib is avoided, since it takes as long as typesetting several
+        # pages.
+        (package,) = find_spec("matplotlib").submodule_search_locations
+        fonts = Path(package) / "mpl-data" / "fonts" / "ttf"
+        for pattern in FONT_FILES:
+            for path in fonts.glob(pattern):
+                shutil.copyfile(path, Path(folder) / path.name)
         for name, content in files.items():
             (Path(folder) / name).write_bytes(content)
         if not _is_memory_limited():
@@ -193,18 +200,6 @@ def _forget():
 
     for _ in range(FORGETTING):
         typst.compile(b"", ignore_system_fonts=True)
-
-
-def _copy_fonts(folder):
-    """Copy the fonts of the figures from matplotlib, except its fallback font.
-
-    The import of matplotlib is avoided, since it takes as long as typesetting several pages.
-    """
-    (package,) = find_spec("matplotlib").submodule_search_locations
-    fonts = Path(package) / "mpl-data" / "fonts" / "ttf"
-    for pattern in FONT_FILES:
-        for path in fonts.glob(pattern):
-            shutil.copyfile(path, Path(folder) / path.name)
 
 
 def _add_formulas(block):

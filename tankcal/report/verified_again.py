@@ -524,10 +524,6 @@ def content_of_paper(name, content, ignored=()):
     ignored : collection of str, optional
         Words and numbers to omit, such as versions of packages.
 
-    Returns
-    -------
-    PaperContent
-
     Raises
     ------
     ValueError

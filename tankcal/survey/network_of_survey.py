@@ -90,10 +90,6 @@ def gather(measurements):
     ----------
     measurements : Measurements
 
-    Returns
-    -------
-    GatheredSurvey
-
     Raises
     ------
     InputError
@@ -621,7 +617,11 @@ def _counts(survey):
             counter += 2 * rays
     for table in survey.observations:
         if isinstance(table, ControlCoordinates):
-            _add_control(table, plan, height, rows)
+            # Control coordinates count as readings of their points.
+            flat = table.axis < 2
+            np.add.at(plan, table.point[flat], 1)
+            np.add.at(height, table.point[~flat], 1)
+            np.add.at(rows, table.point, 1)
             continue
         if not table.ties:
             continue
@@ -636,11 +636,3 @@ def _counts(survey):
             rows += count
             measured |= (count > 0) & table.of_survey
     return plan, height, rows, rays, measured
-
-
-def _add_control(control, plan, height, rows):
-    """Add control coordinates to the counts."""
-    flat = control.axis < 2
-    np.add.at(plan, control.point[flat], 1)
-    np.add.at(height, control.point[~flat], 1)
-    np.add.at(rows, control.point, 1)

@@ -532,10 +532,6 @@ def sag_of(strap, tape, obstructions):
     obstructions : iterable of Obstruction
         Obstructions of other kinds are ignored.
 
-    Returns
-    -------
-    Sag
-
     Raises
     ------
     ValueError

@@ -498,10 +498,6 @@ def fit_support(azimuth_rad, support_m, order=1, sd_m=1.0):
     sd_m : float or ndarray, shape (n,)
         Standard deviations of the distances, up to a common factor.
 
-    Returns
-    -------
-    SupportCurve
-
     Raises
     ------
     numpy.linalg.LinAlgError

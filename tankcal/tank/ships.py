@@ -236,10 +236,6 @@ def piped_mesh(mesh, pipe, trim=0.0, list_=0.0, *, scale=1.0, contracted=None, m
     marks_m : float
         Distance between the draught marks.
 
-    Returns
-    -------
-    PipedMesh
-
     References
     ----------
     Closed form: a shear along z preserves volumes and plans; sums over triangles as in

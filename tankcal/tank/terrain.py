@@ -169,10 +169,6 @@ def surface(plan_m, faces, heights_m):
     faces : ndarray of int, shape (t, 3)
     heights_m : array_like, shape (v,)
         Heights of the vertices, m.
-
-    Returns
-    -------
-    Surface
     """
     heights = np.asarray(heights_m, dtype=float)
     a, b, c = np.moveaxis(plan_m[faces], 1, 0)

@@ -121,10 +121,6 @@ def make_block(adjustment, setup, alpha=ALPHA):
         Camera whose calibration is compared.
     alpha : float, optional
         Significance level of the tests at check points.
-
-    Returns
-    -------
-    Block
     """
     adjusted = adjustment.adjusted
     photos = adjusted.survey.photos

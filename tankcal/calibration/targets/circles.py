@@ -141,7 +141,9 @@ def _measure_circle(image, start, smallest):
     centre, axes, turn = start
     blur = START_BLUR_PX
     for _ in range(2):
-        distance = _distance_from_border(image, centre, axes)
+        # Distance of the ellipse from the edge of the photo, px.
+        last = np.array(image.shape[::-1]) - 1
+        distance = float(min(centre.min(), (last - centre).min()) - axes[0])
         if distance < BORDER_PX:
             return RefusedTarget("at_border", centre, None, {"room_px": distance})
         fit = _fit_ellipse(image, centre, axes, turn, blur)
@@ -171,12 +173,6 @@ def _is_distinct(image, centre, axes, turn):
         return False
     contrast = inside.mean() - around.mean()
     return contrast > max(LEAST_CONTRAST / 2, 2.5 * max(inside.std(), around.std()))
-
-
-def _distance_from_border(image, centre, axes):
-    """Distance of the ellipse from the edge of the photo, px."""
-    last = np.array(image.shape[::-1]) - 1
-    return float(min(centre.min(), (last - centre).min()) - axes[0])
 
 
 def _pixels_around(image, centre, reach):

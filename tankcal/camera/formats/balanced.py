@@ -66,10 +66,6 @@ def convert_from_balanced(camera, pixel_mm, size_px):
         Size of a pixel, or width and height, mm.
     size_px : sequence of two int
         Columns and lines.
-
-    Returns
-    -------
-    FramedCamera
     """
     # The balanced form is a form of tankcal, so that no fit is necessary.
     return make_framed_camera(*_interior_of(camera), pixel_mm, size_px)

@@ -97,10 +97,6 @@ def convert_from_brown(brown, pixel_mm, size_px):
     size_px : sequence of two int
         Columns and lines.
 
-    Returns
-    -------
-    FramedCamera
-
     Raises
     ------
     SolutionError

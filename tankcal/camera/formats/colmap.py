@@ -62,10 +62,6 @@ def convert_from_colmap(camera, pixel_mm):
     pixel_mm : float
         Height of a pixel, mm; the width follows from fx and fy.
 
-    Returns
-    -------
-    FramedCamera
-
     Raises
     ------
     SolutionError

@@ -89,10 +89,6 @@ def make_framed_camera(interior, form, pixel_mm, size_px, error_px=0.0):
         Columns and lines.
     error_px : float, optional
         Error of the conversion, px.
-
-    Returns
-    -------
-    FramedCamera
     """
     return FramedCamera(
         np.array(interior, dtype=float),
@@ -114,10 +110,6 @@ def make_film_camera(interior, form, format_mm):
         Form of the distortion.
     format_mm : array_like, shape (2,)
         Width and height of the film, mm.
-
-    Returns
-    -------
-    FramedCamera
     """
     film_mm = np.array(format_mm, dtype=float)
     # Film has no pixels; nominal pixels provide a grid for errors and conversions.

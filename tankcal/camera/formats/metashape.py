@@ -68,10 +68,6 @@ def convert_from_metashape(camera, pixel_mm):
     pixel_mm : float
         Height of a pixel, mm; the width follows from f and B1.
 
-    Returns
-    -------
-    FramedCamera
-
     Raises
     ------
     SolutionError

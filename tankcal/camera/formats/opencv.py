@@ -90,10 +90,6 @@ def convert_from_opencv(camera, pixel_mm, size_px):
     size_px : sequence of two int
         Columns and lines.
 
-    Returns
-    -------
-    FramedCamera
-
     Raises
     ------
     SolutionError

@@ -69,10 +69,6 @@ def convert_from_pix4d(camera, size_px):
         Columns and lines. The pixels are square, with a side of the sensor's height divided by the
         lines.
 
-    Returns
-    -------
-    FramedCamera
-
     Raises
     ------
     SolutionError

@@ -143,7 +143,10 @@ def sample_things(points, cells):
     for scan, xyz in points:
         if not cells.from_inside[scan]:
             continue
-        cell_index = _cell_indices(xyz, cells.grid)
+        # Indices (n, 3) of points: cell along x, cell along y, and level.
+        plan = np.floor((xyz[:, :2] - cells.grid.corner_m) / cells.grid.cell_m)
+        up = np.floor((xyz[:, 2] - cells.grid.low_m) / STACK_M)
+        cell_index = np.column_stack([plan, up]).astype(np.int64)
         in_grid = np.all((cell_index >= 0) & (cell_index < label.shape), axis=1)
         xyz, cell_index = xyz[in_grid], cell_index[in_grid]
         thing_of_point = label[tuple(cell_index.T)]
@@ -185,13 +188,6 @@ def find_things(passes, bottom, sides=None):
             column = _fit_column(xyz, level, grid) if number <= standing else None
             things.append(column or _make_box(xyz, label == number, level, bottom))
     return tuple(sorted(things, key=lambda thing: thing.low_m[2] - thing.high_m[2]))
-
-
-def _cell_indices(xyz_m, grid):
-    """Indices (n, 3) of points: cell along x, cell along y, and level."""
-    plan = np.floor((xyz_m[:, :2] - grid.corner_m) / grid.cell_m)
-    up = np.floor((xyz_m[:, 2] - grid.low_m) / STACK_M)
-    return np.column_stack([plan, up]).astype(np.int64)
 
 
 def _label_objects(bottom, level):

@@ -110,10 +110,6 @@ def floor_grid(surface, bottom_m, top_m, *, below_m=None, above_m=None, cell_m=N
         is at most half the height of the shell.
     cell_m : float, optional
         Side of a cell, m. By default 0.25 m, and more for a tank wider than 18 m.
-
-    Returns
-    -------
-    FloorGrid
     """
     reach = floor_reach(surface.radius_m)
     return FloorGrid(

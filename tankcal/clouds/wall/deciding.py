@@ -268,10 +268,6 @@ def _find_two_surfaces(side_wall, counts, cells):
         Histograms in which the wall was found.
     cells : WallCells
         Sums over the points in cells.
-
-    Returns
-    -------
-    InputError or None
     """
     grid, wall = cells.grid, side_wall.why == WALL
     seen = max(np.count_nonzero(wall | side_wall.two_modes | (side_wall.other >= 0)), 1)

@@ -311,10 +311,6 @@ def make_grid(
         Number of scans.
     band_m, row_m, memory_bytes : optional
         As for `find_cloud_wall`.
-
-    Returns
-    -------
-    CellGrid
     """
     around = FULL_TURN * surface.radius_m
     columns = max(FEWEST_COLUMNS, int(np.ceil(around / COLUMN_M)))

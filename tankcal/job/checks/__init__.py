@@ -104,19 +104,14 @@ def _check_of_kind(values, tables, extent, kind, raw, log):
         check_sphere(
             values,
             has_wall_points(tables),
-            _is_measured(kind, tables, raw),
+            any(
+                method.is_given(tables) or raw.tables.get(method.readings_table, ()) is None
+                for method in methods_for(kind)
+                if not method.is_supplement
+            ),
             loads_sphere(values),
             raw,
             log,
         )
     if tables["deadwood"] is not None:
         check_deadwood(tables["deadwood"], extent, log)
-
-
-def _is_measured(kind, tables, raw):
-    """Whether a method for this kind has readings, or a table of readings that is unreadable."""
-    return any(
-        method.is_given(tables) or raw.tables.get(method.readings_table, ()) is None
-        for method in methods_for(kind)
-        if not method.is_supplement
-    )

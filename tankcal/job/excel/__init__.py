@@ -82,7 +82,10 @@ class Values:
         if kind == "e":
             return BadCell(message("cell_shows", "the cell shows {found}", found=shown(content)))
         if kind == "d":
-            return _iso_date(content)
+            try:
+                return datetime.datetime.fromisoformat(content.removesuffix("Z"))
+            except ValueError:
+                return content
         raise damaged()
 
     def _number(self, attributes, content):
@@ -105,13 +108,6 @@ class Values:
                     value=value,
                 )
             )
-
-
-def _iso_date(content):
-    try:
-        return datetime.datetime.fromisoformat(content.removesuffix("Z"))
-    except ValueError:
-        return content
 
 
 def unescaped(text):

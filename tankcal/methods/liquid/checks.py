@@ -172,7 +172,9 @@ def _check_settings(values, tables, raw, log):
             run=next(iter(runs)),
         )
         tell(log.problem, raw, "liquid", "run_ppm", expected)
-    alone = is_unsurveyed(tables) and not _has_unreadable_survey(raw)
+    alone = is_unsurveyed(tables) and not any(
+        table is None for name, table in raw.tables.items() if name != "liquid"
+    )
     if alone and given["table"] == GEOMETRY:
         expected = message(
             "no_geometry_beside_liquid",
@@ -186,10 +188,6 @@ def _check_settings(values, tables, raw, log):
             "given beside a survey of the wall; expected only where liquid alone tells the tank",
         )
         tell(log.problem, raw, "liquid", "u_radius_mm", expected)
-
-
-def _has_unreadable_survey(raw):
-    return any(table is None for name, table in raw.tables.items() if name != "liquid")
 
 
 def _check_beside(values, tables, kind, raw, log):

@@ -170,10 +170,6 @@ def ship_tables(job, survey, body, table, progress=None):
     progress : callable, optional
         Called as progress(text, done, total).
 
-    Returns
-    -------
-    ShipTables
-
     Raises
     ------
     InputError

@@ -133,10 +133,6 @@ def update_by_survey(job, surveyed, progress):
     progress : callable
         Called with a line of text as the step begins.
 
-    Returns
-    -------
-    RadiiWall
-
     Raises
     ------
     SolutionError
@@ -183,10 +179,6 @@ def update_radii(prior_m2, measured, misclosure_m, noise_m2, shared_m=0.0):
         Covariance R of the new radii, m2.
     shared_m : float
         Standard uncertainty common to all former and new radii, m: C = shared^2 1 1'.
-
-    Returns
-    -------
-    RadiiUpdate
 
     Examples
     --------

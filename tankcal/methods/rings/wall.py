@@ -190,10 +190,6 @@ def find_ringed_wall(job, progress, amplitudes=None):
         Called with a line of text when the step begins.
     amplitudes : Amplitudes, optional
         Known amplitudes of the wall components; None: estimated from the readings.
-
-    Returns
-    -------
-    RingedWall
     """
     straps = job.strapping
     progress(

@@ -35,7 +35,11 @@ def check_strapping(values, tables, registers, raw, log):
         return
     courses = tables["courses"]
     known = () if courses is None else tuple(courses.of("course"))
-    is_alone = _stands_alone(tables, raw)
+    # Are circumferences the only measurements of the wall?
+    # An unreadable table of points counts as a measurement. Set-ups without sights are reported
+    # separately.
+    unreadable = (raw.tables.get(name, ()) is None for name in ("points", "wall_hits", *READINGS))
+    is_alone = not (has_wall_points(tables) or has_rows(tables["setups"]) or any(unreadable))
     needs_each_course = is_alone and _tell_each_course(tables, raw)
     _check_courses(straps, tables, courses, known, needs_each_course, log)
     check_readings(straps, tables, registers, raw, log)
@@ -45,16 +49,6 @@ def check_strapping(values, tables, registers, raw, log):
         check_girths(straps, values["tank"]["nominal_diameter_m"], IMPOSSIBLE_MISS, log)
         check_strapping_settings(values, tables, registers, is_alone, raw, log)
         check_levels(straps, courses, values, log)
-
-
-def _stands_alone(tables, raw):
-    """Return True if circumferences are the only measurements of the wall.
-
-    An unreadable table of points counts as a measurement. Set-ups without sights are reported
-    separately.
-    """
-    unreadable = (raw.tables.get(name, ()) is None for name in ("points", "wall_hits", *READINGS))
-    return not (has_wall_points(tables) or has_rows(tables["setups"]) or any(unreadable))
 
 
 def _tell_each_course(tables, raw):

@@ -50,10 +50,6 @@ def find_strapped_wall(job, progress, amplitudes=None):
         Called with a line of text when a step begins.
     amplitudes : Amplitudes, optional
         Known amplitudes of the wall components; None: estimated from the readings.
-
-    Returns
-    -------
-    StrappedWall
     """
     straps, lines = job.strapping, job.lines
     progress(

@@ -112,7 +112,9 @@ def touch_wall(job, poses, tools, progress, dof=np.inf, amplitudes=None):
     hull = round_hull(len(job.tangents))
     for number in range(ROUNDS + 1):
         touching = touch(job.tangents, poses, **arguments, hull=hull)
-        job_of_points = _with_points(job, touching)
+        # Job with its adjusted tangents as points.
+        points = take_points(touching.points, np.flatnonzero(~job.tangents.check))
+        job_of_points = replace(job, points=s_transform(points))
         wall = find_wall(job_of_points, progress, dof, amplitudes)
         former_hull, hull = hull, _hull_of(job, touching, wall)
         if number and _is_settled(former_hull, hull):
@@ -121,7 +123,17 @@ def touch_wall(job, poses, tools, progress, dof=np.inf, amplitudes=None):
             hull = halfway(former_hull, hull)
         progress = _be_silent  # do not report the same steps again
     if abs(_mean_change(former_hull, hull)) > former_hull.common_sd_m.mean():
-        raise SolutionError(_not_settled(former_hull, hull))
+        raise SolutionError(
+            message(
+                "excess_not_settled",
+                "no capacity: the convex hull that the tangents touch stands {before_mm:.1f} mm"
+                " outside the wall in one pass and {after_mm:.1f} mm in the next, so the tangents"
+                " do not determine the form of this wall; sight more limbs (stations at other"
+                " distances), strap a course (circumferences.csv), or measure points of the wall",
+                before_mm=1000 * float(former_hull.excess_m.max()),
+                after_mm=1000 * float(hull.excess_m.max()),
+            )
+        )
     return job_of_points, touching, wall  # oscillates within the uncertainty of the excess
 
 
@@ -158,7 +170,10 @@ def _hull_of(job, touching, wall):
         course = int(course_of(height, joints))
         low, high = joints[course : course + 2]
         outline = field.outlines_at([2 * (height - low) / (high - low) - 1])[course, 0]
-        outline = _remove_shift(outline)
+        # Radii at equally spaced azimuths without their first harmonic, about their own centre.
+        waves = np.fft.rfft(outline)
+        waves[1] = 0.0
+        outline = np.fft.irfft(waves, len(outline))
         support = support_of(outline)
         step = FULL_TURN / len(outline)
         index = np.rint(touching.normal_rad[is_of_level] / step).astype(int) % len(outline)
@@ -170,13 +185,6 @@ def _hull_of(job, touching, wall):
     return Hull(excess_m + unseen_excess[:, 0], unseen_excess[:, 1], unseen_excess[:, 2], slope_m)
 
 
-def _remove_shift(radii_m):
-    """Radii at equally spaced azimuths without their first harmonic, about their own centre."""
-    waves = np.fft.rfft(radii_m)
-    waves[1] = 0.0
-    return np.fft.irfft(waves, len(radii_m))
-
-
 def _departure_of_limbs(field):
     """Standard deviation of the radii about the circles of their levels, m."""
     design = free_design(field.sites)[0]
@@ -186,27 +194,8 @@ def _departure_of_limbs(field):
     )
 
 
-def _not_settled(former, latter):
-    """Message that wall and excess do not settle."""
-    return message(
-        "excess_not_settled",
-        "no capacity: the convex hull that the tangents touch stands {before_mm:.1f} mm outside the"
-        " wall in one pass and {after_mm:.1f} mm in the next, so the tangents do not determine the"
-        " form of this wall; sight more limbs (stations at other distances), strap a course"
-        " (circumferences.csv), or measure points of the wall",
-        before_mm=1000 * float(former.excess_m.max()),
-        after_mm=1000 * float(latter.excess_m.max()),
-    )
-
-
 def _be_silent(text):
     """Progress callback that does nothing."""
-
-
-def _with_points(job, touching):
-    """Job with its adjusted tangents as points."""
-    points = take_points(touching.points, np.flatnonzero(~job.tangents.check))
-    return replace(job, points=s_transform(points))
 
 
 def _refuse_untied(tangents, poses):

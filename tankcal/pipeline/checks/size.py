@@ -118,10 +118,6 @@ def inside_radii(job, survey):
     job : Job
     survey : Wall, StrappedWall, RingedWall, RadiiWall, Scan, mesh, survey of a method, or None
         Object whose `surveyed_as` names the kind of survey.
-
-    Returns
-    -------
-    InsideRadii or None
     """
     kind = None if survey is None else survey.surveyed_as
     if kind == "wall":

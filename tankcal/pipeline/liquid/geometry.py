@@ -167,10 +167,6 @@ def load_geometry(geometry, densities_kg_m3, dips_m, shell_c):
         Dips.
     shell_c : ndarray, shape (d,)
         Temperature of the shell, degree Celsius; nan: not known.
-
-    Returns
-    -------
-    Loaded
     """
     declared, at_dips = densities_kg_m3[0], densities_kg_m3[1:]
     body = geometry.body(declared)
@@ -326,10 +322,6 @@ def wide_input(name, u, unit, as_read):
         Unit for reports.
     as_read : float
         Standard uncertainty in this unit.
-
-    Returns
-    -------
-    DeclaredInput
     """
     return DeclaredInput(name, u, unit, as_read, is_default=True)
 
@@ -380,10 +372,6 @@ def find_nominal_wall(job, progress=lambda text: None):
     job : Job
     progress : callable
         Called with a line of text when the step begins.
-
-    Returns
-    -------
-    NominalWall
     """
     progress(message("nominal_wall", "taking the wall of the drawing, which liquid will measure"))
     joints, zero, sd = joints_of(job), shell_zero(job, None), job.liquid.u_radius_m

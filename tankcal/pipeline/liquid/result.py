@@ -219,10 +219,6 @@ def beside_table(kind, body, levels_m, probability, known=None):
         Coverage probability of U.
     known : ndarray of bool, shape (rows,), optional
         Rows with information; None: all rows.
-
-    Returns
-    -------
-    BesideTable
     """
     levels = np.asarray(levels_m, dtype=float)
     known = np.full(len(levels), True) if known is None else known

@@ -119,10 +119,6 @@ def simulate_table(job, survey, body, zero_m, table, pairs=(), *, goal=None, pro
     progress : callable, optional
         Called as progress(text, done, total).
 
-    Returns
-    -------
-    TableSimulation
-
     Raises
     ------
     HeightError
@@ -211,10 +207,6 @@ def datum_law(body, levels_m, u_m, distribution):
         Standard uncertainty of the datum, m.
     distribution
         Distribution of the datum, in units of u_m.
-
-    Returns
-    -------
-    DatumLaw
     """
     below = ndtr(SCORES)
     steps = u_m * distribution.quantile(below)
@@ -237,10 +229,6 @@ def simulate_bent(rest, distributions, added_m3, below, goal):
     below : ndarray, shape (edges,)
         Probability below each edge.
     goal : monte_carlo.Goal
-
-    Returns
-    -------
-    Simulation
     """
     inputs = inputs_of(distributions, None) if distributions else None
     # Independent randomised sets give the standard error of each estimate from their scatter.

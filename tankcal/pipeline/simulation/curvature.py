@@ -201,10 +201,6 @@ def curvature(job, survey, body, levels_m, declared, least_m3):
         {name: u in SI units} of inputs with one column each.
     least_m3 : ndarray, shape (rows,)
         u of each row, m3. Second derivatives below 1e-4 of it in all rows are neglected.
-
-    Returns
-    -------
-    Curvature
     """
     chosen_rows = _picked(len(levels_m))
     columns_by_pair = {}
@@ -346,10 +342,6 @@ def judged_intervals(judged, volume_m3, u_m3, U_m3, least_m3=-np.inf):
         Volumes, standard and expanded uncertainties, m3.
     least_m3 : float
         Lower bound of a Monte Carlo interval, m3; the volume of a tank is not negative.
-
-    Returns
-    -------
-    Intervals
 
     Raises
     ------

@@ -34,10 +34,6 @@ def body_of(job, survey, switches=None, uncertain=True):
         Enabled corrections; None: those of the job.
     uncertain : bool
         Whether to propagate the covariance of the points; sizes of corrections do not need it.
-
-    Returns
-    -------
-    Body
     """
     switches = job.switches if switches is None else switches
     if job.tank.kind == "vertical":

@@ -27,10 +27,6 @@ def factor_of_unseen(kind, parts, sizes, assumed):
         Weight of each component in the uncertainty.
     assumed : sequence of float, length k
         Share of each amplitude that is assumed.
-
-    Returns
-    -------
-    Factor
     """
     sizes = np.maximum(sizes, 1e-30)
     origin = told_by(float(sizes @ assumed / sizes.sum()))

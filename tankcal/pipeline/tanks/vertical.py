@@ -129,10 +129,6 @@ def shell_volume(wall, insets_m=None, scale=1.0, stretch=1.0, *, departures=()):
         Factor of heights.
     departures : sequence of str
         Declared departures among "barrel" and "taper".
-
-    Returns
-    -------
-    ShellVolume
     """
     outlines, sites, levels = wall.field.outlines_m, wall.field.sites, gauss_heights()
     missed = {
@@ -194,10 +190,6 @@ def vertical_body(job, wall, switches, uncertain):
         Enabled corrections.
     uncertain : bool
         Whether to propagate the uncertainty of the wall.
-
-    Returns
-    -------
-    Body
     """
     job = as_surveyed(job, wall)
     shell = _shell(job, wall, switches, uncertain)
@@ -242,7 +234,10 @@ def _bottom(job, wall, shell):
     from tankcal.tank.bottoms import leaning_bottom, shaped_bottom, surveyed_bottom
 
     bottom, low = job.bottom, job.datum.bottom_z_m
-    footprint = _footprint(wall, shell)
+    # Inside outline of the first course at its bottom: the lowest section, scaled to its area.
+    x, y, radius = wall.lowest_outline(np.arange(FOOTPRINT) * FULL_TURN / FOOTPRINT)
+    larger = shell.volume.area_m2([0.0])[0] / (np.pi * np.mean(radius**2))
+    footprint = Footprint(float(x), float(y), radius * np.sqrt(larger))
     if bottom.form == "leaning":
         return leaning_bottom(footprint, wall.shell.slope)
     if bottom.xyz_m is not None:
@@ -253,13 +248,6 @@ def _bottom(job, wall, shell):
     rise = 0.0 if bottom.centre_z_m is None else bottom.centre_z_m - low
     depth, *radii = _sizes_of_head(bottom, footprint.area_m2, abs(rise))
     return shaped_bottom(bottom.form, footprint.area_m2, np.copysign(depth, rise), *radii)
-
-
-def _footprint(wall, shell):
-    """Inside outline of the first course at its bottom: the lowest section, scaled to its area."""
-    x, y, radius = wall.lowest_outline(np.arange(FOOTPRINT) * FULL_TURN / FOOTPRINT)
-    larger = shell.volume.area_m2([0.0])[0] / (np.pi * np.mean(radius**2))
-    return Footprint(float(x), float(y), radius * np.sqrt(larger))
 
 
 def _head(job, shell, zero, highest_m):
@@ -323,10 +311,6 @@ def _shell(job, wall, switches, uncertain):
         Enabled corrections.
     uncertain : bool
         Whether to propagate the uncertainty of the wall.
-
-    Returns
-    -------
-    ShellPart
     """
     scale = thermal_scale(job, switches)
     stretch = scale if job.table.height_expansion else 1.0

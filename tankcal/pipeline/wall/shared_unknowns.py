@@ -247,10 +247,6 @@ def told_unknowns(points, unbound, field, parts):
     field : WallField
     parts : tuple
         accepted (m,), radii_by_points (n, 3m), covariance_m2 (3m, 3m), as in `Wall`.
-
-    Returns
-    -------
-    ToldUnknowns
     """
     accepted, by_points, covariance = parts
     shared, index = offsets_then_poses(points), coordinates_of(accepted)
@@ -403,10 +399,6 @@ def unbound_of(points, by_points, accepted):
     by_points : ndarray, shape (n, 3 m)
         Derivative of the radii by the coordinates of the accepted points.
     accepted : ndarray of int, shape (m,)
-
-    Returns
-    -------
-    Unbound
     """
     index = coordinates_of(accepted)
     columns = {False: [], True: []}

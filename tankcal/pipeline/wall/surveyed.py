@@ -101,10 +101,6 @@ def tell_undecided(names, shell, most):
     shell : Shell
     most : int
         Largest number of names in the text.
-
-    Returns
-    -------
-    tuple
     """
     undecided = np.flatnonzero(shell.reason == UNDECIDED)
     if not len(undecided):

@@ -60,10 +60,6 @@ def design_of(plan_input, courses, celsius=None):
         Names of the courses, from the bottom up.
     celsius : float, optional
         Temperature of the table.
-
-    Returns
-    -------
-    Design
     """
     straps = (
         PlannedStrap(course, percent, entry["s_mm"], int(entry["readings"] or 1), _more(entry))
@@ -158,10 +154,6 @@ def wall_plan_of(raw, values, tables, plan_input, limits, folder):
     folder : str
         Name of the folder.
 
-    Returns
-    -------
-    WallPlan
-
     Raises
     ------
     InputError
@@ -217,10 +209,6 @@ def change_plan(plan, design=None, raw=None):
     design : Design, optional
     raw : RawJob, optional
         Content of the folder with other instruments.
-
-    Returns
-    -------
-    WallPlan
 
     Raises
     ------

@@ -358,10 +358,6 @@ class Desk:
         on_progress, papers, on_result
             As in `Run`.
 
-        Returns
-        -------
-        Run
-
         Raises
         ------
         Refusal

@@ -154,10 +154,6 @@ class Reader:
             Name of the table or list, or "job".
         every_key : bool
             Whether to show all keys, not only given and required keys.
-
-        Returns
-        -------
-        ShownTable
         """
         if name in draft.keys:
             return self._show_keys(draft, check, name, every_key)

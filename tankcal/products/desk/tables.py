@@ -242,10 +242,6 @@ def read_csv_table(name, file, text, separator, decimal):
         Text of the file, with its byte order mark if it has a mark.
     separator, decimal : str
         Declared separator and decimal mark.
-
-    Returns
-    -------
-    EditedTable
     """
     mark = MARK_OF_ORDER if text.startswith(MARK_OF_ORDER) else ""
     lines, endings = _lines(text.removeprefix(mark))

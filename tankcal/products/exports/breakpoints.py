@@ -292,7 +292,13 @@ def _greedy_path(table, points):
     low, high, best = 0.0, 2 * float(np.ptp(table.volume)) + float(table.rounding_error.max()), None
     for _ in range(_MOST_TURNS):
         eps = high if best is None else 0.5 * (low + high)
-        rows = _longest_chords_path(table, eps)
+        # Rows of the longest chords within eps; empty if a required row has a larger error.
+        is_open = _open_rows(table, eps)
+        rows = (
+            table.longest_chords(is_open, eps)
+            if np.all(is_open[_mark_required_rows(table)])
+            else ()
+        )
         if best is None or 0 < len(rows) <= points:
             best, high = rows, min(eps, max(table.largest_error(rows), low))
         else:
@@ -300,12 +306,6 @@ def _greedy_path(table, points):
         if high - low <= _CLOSE * high:
             break
     return best
-
-
-def _longest_chords_path(table, eps):
-    """Rows of the longest chords within eps; empty if a required row has a larger error."""
-    is_open = _open_rows(table, eps)
-    return table.longest_chords(is_open, eps) if np.all(is_open[_mark_required_rows(table)]) else ()
 
 
 def _optimum(table, points, rows):

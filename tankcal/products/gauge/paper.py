@@ -210,7 +210,9 @@ def pages(paper, folder=None, whole=False):
         blocks.whole(paper.show(BUDGET)),
         paper.show(_drop_blanks(CORRECTIONS, gauge["corrections"]), across=2),
         paper.paragraph("corrections"),
-        *_zeros(paper),
+        blocks.with_next(paper.heading("zeros")),
+        blocks.with_next(paper.figure(sketch(paper), "gauge_sketch")),
+        blocks.whole(paper.show(ZEROS)),
         *_head_of_liquid(paper),
         paper.heading("remarks"),
         blocks.listing(_remarks(paper)),
@@ -307,16 +309,6 @@ def _slope_text(paper):
         )
     }
     return paper.word(f"texts.tilt_{line['tilt_is']}", **angles)
-
-
-def _zeros(paper):
-    """Heading, sketch and table of the zeros."""
-
-    return [
-        blocks.with_next(paper.heading("zeros")),
-        blocks.with_next(paper.figure(sketch(paper), "gauge_sketch")),
-        blocks.whole(paper.show(ZEROS)),
-    ]
 
 
 def _head_of_liquid(paper):
@@ -453,9 +445,16 @@ def sketch(paper):
     ax.plot([_LEFT, _LEFT, _RIGHT, _RIGHT], [_TOP, 0.2, 0.2, _TOP], color=INK, linewidth=1.4)
     ax.plot([_LEFT, _RIGHT], [_TOP, _TOP], color=INK, linewidth=0.8)
     ax.add_patch(Rectangle((_LEFT, 0.2), _RIGHT - _LEFT, 0.75, color=PALE, alpha=0.35, linewidth=0))
-    _draw_gauge(ax, gauge["gauge"]["supported_by"])
+    # Gauge on the roof; a still pipe down to the bottom, or ends above it.
+    foot = 0.2 if gauge["gauge"]["supported_by"] == "bottom" else 0.9
+    for side in (-0.06, 0.06):
+        ax.plot([_PIPE + side] * 2, [foot, _TOP + 0.12], color=GREY, linewidth=0.8)
+    ax.add_patch(Rectangle((_PIPE - 0.13, _TOP + 0.12), 0.26, 0.18, facecolor="white",
+                           edgecolor=INK, linewidth=0.9))  # fmt: skip
     known = [zero for zero in gauge["zeros"][:3] if zero["z_mm"] is not None]
-    heights = _heights(known)
+    # Height of each zero on the page, by its order; equal zeros are drawn apart.
+    order = sorted(range(len(known)), key=lambda place: (known[place]["z_mm"], place))
+    heights = [0.34 + _STEP * order.index(place) for place in range(len(known))]
     for zero, y in zip(known, heights, strict=True):
         colour = _COLOURS[zero["code"]]
         ax.plot([_LEFT + 0.1, _TEXT - 0.08], [y, y], color=colour, linewidth=1.0,
@@ -465,12 +464,6 @@ def sketch(paper):
     return figure
 
 
-def _heights(zeros):
-    """Height of each zero on the page, by its order; equal zeros are drawn apart."""
-    order = sorted(range(len(zeros)), key=lambda place: (zeros[place]["z_mm"], place))
-    return [0.34 + _STEP * order.index(place) for place in range(len(zeros))]
-
-
 def _label(paper, zero):
     """Name of a zero with its z and U."""
     name = paper.words["zeros"][zero["code"]]
@@ -478,15 +471,6 @@ def _label(paper, zero):
         return f"{name}: z = 0"
     height = paper.text_with_u(zero["z_mm"], zero["U_mm"])
     return f"{name}: z = {height}"
-
-
-def _draw_gauge(ax, support):
-    """Gauge on the roof; a still pipe down to the bottom, or ends above it."""
-    foot = 0.2 if support == "bottom" else 0.9
-    for side in (-0.06, 0.06):
-        ax.plot([_PIPE + side] * 2, [foot, _TOP + 0.12], color=GREY, linewidth=0.8)
-    ax.add_patch(Rectangle((_PIPE - 0.13, _TOP + 0.12), 0.26, 0.18, facecolor="white",
-                           edgecolor=INK, linewidth=0.9))  # fmt: skip
 
 
 def _draw_reference(ax, paper, y_plate):

@@ -101,10 +101,6 @@ def profile_gaps(s_m, e_m, sd_m, *, has_bead=False):
         Whether a bead hides the weld. If so, the wall under the bead is extrapolated from both
         sides.
 
-    Returns
-    -------
-    BoardGaps or None
-
     Examples
     --------
     >>> s = np.linspace(-0.55, 0.55, 89)
@@ -309,10 +305,6 @@ def lay_boards(wall, weld, across_m, grid, distance, sd):
         Fine cells beside the welds of this kind.
     distance, sd : ndarray, shape (scans, slots + 1)
         Distances of the wall in the fine cells and their standard deviations, m, of `locate_wall`.
-
-    Returns
-    -------
-    Boards
     """
     profiles = _profiles(wall, weld, across_m, grid, distance, sd)
     boards = _average_boards(weld, *profiles)

@@ -187,10 +187,6 @@ def assemble_inspection(basis, rule, bottom=None, welds=None, *, nominal="drawin
         Gaps at the welds.
     nominal : str
         One of NOMINALS.
-
-    Returns
-    -------
-    record.inspection.InspectionFile
     """
     sizes, problems, bottom = basis.sizes, [], bottom or Bottom()
     if nominal == "mean":
@@ -490,10 +486,6 @@ def read_basis(source, progress, part_progress=None):
         Job, record.json or folder of results.
     progress, part_progress : callable
         Callbacks as in `tankcal.run`.
-
-    Returns
-    -------
-    Basis
 
     Raises
     ------

@@ -387,10 +387,6 @@ def make_settlement(assessed, strength, sd_known):
         Diameter of the tank, m.
     sd_known : bool
         Whether s_mm was given.
-
-    Returns
-    -------
-    Settlement
     """
     plane, epoch, k = assessed.plane, assessed.epoch, assessed.k
     circumference_m = np.pi * strength.diameter_m

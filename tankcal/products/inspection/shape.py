@@ -77,10 +77,6 @@ def spread_of(value, u, dof):
         Values and standard uncertainties, in the same unit.
     dof : sequence of float or None, length n
         Degrees of freedom; None for infinite.
-
-    Returns
-    -------
-    Spread
     """
     dof = np.array([np.inf if nu is None else nu for nu in dof], dtype=float)
     k = coverage_factor(PROBABILITY, dof)

@@ -218,10 +218,6 @@ def build_upright_grid(wall, strips, across_m):
         Welds, and the distances on both sides within which cells are kept, m.
     across_m : float
         Approximate width of a cell, m.
-
-    Returns
-    -------
-    FineGrid
     """
     columns = wall.grid.columns
     division = max(1, round(FULL_TURN * wall.surface.radius_m / columns / across_m))
@@ -249,10 +245,6 @@ def build_round_grid(wall, strips, across_m):
         Welds, and the distances on both sides within which cells are kept, m.
     across_m : float
         Approximate height of a cell, m.
-
-    Returns
-    -------
-    FineGrid
     """
     parts, parent = [wall.grid.edges_m[:1]], []
     for row, (low, high) in enumerate(pairwise(wall.grid.edges_m)):

@@ -411,7 +411,10 @@ def draw_tank(rng, name, family):
     Tank
     """
     radius = round(float(rng.uniform(*WIDTHS_M)), 2)
-    courses = _courses(rng, radius)
+    # Heights of courses, equal but for deviations of 1.5 mm (standard deviation), m.
+    count = int(rng.integers(4, 7))
+    nominal = rng.choice([1.5, 1.8, 2.0])
+    courses = nominal + 1.5e-3 * rng.normal(size=count)
     joints = np.concatenate([[0.0], np.cumsum(courses)])
     height = float(joints[-1])
     defects = [*_course_forms(rng, joints), *_waves(rng, height, family)]
@@ -437,13 +440,6 @@ def draw_tank(rng, name, family):
         e_pa=float(STEEL_E_PA + STEEL_E_SD * rng.normal()),
         expansion_per_k=float(STEEL_EXPANSION + STEEL_EXPANSION_SD * rng.normal()),
     )
-
-
-def _courses(rng, radius):
-    """Heights of courses, equal but for deviations of 1.5 mm (standard deviation), m."""
-    count = int(rng.integers(4, 7))
-    nominal = rng.choice([1.5, 1.8, 2.0])
-    return nominal + 1.5e-3 * rng.normal(size=count)
 
 
 def _course_forms(rng, joints):

@@ -73,7 +73,17 @@ def ticket_file(tickets):
         insulated=transfer.product.is_insulated,
         gaugings=[_gauging(sections, transfer, state) for state in transfer.gaugings],
         steps=_steps(transfer.steps),
-        quantities=_quantities(quantities),
+        quantities=[
+            QuantityOfTicket(
+                state,
+                name,
+                *map(float, (result.value[0, at], result.u[0, at])),
+                _number(result.dof[0, at]),
+                *map(float, (result.k[0, at], result.U[0, at])),
+            )
+            for state, result in quantities.items()
+            for at, name in enumerate(QUANTITIES)
+        ],
         rooms=_rooms(transfer),
         budget=_budget(quantities),
         uncertainties=_uncertainties(sections["uncertainty"], quantities),
@@ -149,17 +159,6 @@ def _steps(steps):
         )
         for step in fields(closing)
     ]
-
-
-def _quantities(quantities):
-    return [
-        QuantityOfTicket(
-            state, name, *map(float, (result.value[0, at], result.u[0, at])),
-            _number(result.dof[0, at]), *map(float, (result.k[0, at], result.U[0, at])),
-        )
-        for state, result in quantities.items()
-        for at, name in enumerate(QUANTITIES)
-    ]  # fmt: skip
 
 
 def _rooms(transfer):

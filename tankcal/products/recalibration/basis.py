@@ -270,10 +270,6 @@ def bring_to_one_basis(former, new, facts):
     former, new : FormerTable
     facts : TankFacts
 
-    Returns
-    -------
-    OneBasis
-
     Raises
     ------
     InputError

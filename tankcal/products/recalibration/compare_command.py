@@ -104,7 +104,14 @@ def _tell(comparison):
         )
     )
     say(_sum(comparison["waterfall"][-1]))
-    say(_verdict(comparison, paper))
+    say(
+        message(
+            "compare_verdict",
+            "verdict: {verdict} ({rule})",
+            verdict=paper.word(f"verdicts.{comparison['verdict'] or 'none'}"),
+            rule=paper.record["rule"]["name"],
+        )
+    )
     for reason in comparison["reasons"]:
         say(f"  {paper.reason(reason)}")
 
@@ -120,15 +127,6 @@ def _sum(column):
             name: _format_signed(column[f"{name}_m3"], name not in ("former", "new"))
             for name in names
         },
-    )
-
-
-def _verdict(comparison, paper):
-    return message(
-        "compare_verdict",
-        "verdict: {verdict} ({rule})",
-        verdict=paper.word(f"verdicts.{comparison['verdict'] or 'none'}"),
-        rule=paper.record["rule"]["name"],
     )
 
 

@@ -71,10 +71,6 @@ def search(rows, state, lowest_m, usual_density):
         Density of the head and its standard deviation, kg/m3, for bulging courses: a taper of the
         courses resembles a head.
 
-    Returns
-    -------
-    Fit
-
     Raises
     ------
     SolutionError

@@ -29,15 +29,11 @@ def open_lab(notebook):
     """Show a notebook in JupyterLab, on this machine only, until JupyterLab is stopped."""
     from jupyterlab.labapp import LabApp
 
-    _speed_up_kernels()
-    arguments = [str(notebook), f"--ServerApp.ip={HERE}", "--ServerApp.answer_yes=True"]
-    LabApp.launch_instance(arguments)
-
-
-def _speed_up_kernels():
-    """Set environment variables for kernels; several BLAS threads are slow for small matrices."""
+    # Set environment variables for kernels; several BLAS threads are slow for small matrices.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.setdefault("PYDEVD_DISABLE_FILE_VALIDATION", "1")
+    arguments = [str(notebook), f"--ServerApp.ip={HERE}", "--ServerApp.answer_yes=True"]
+    LabApp.launch_instance(arguments)
 
 
 def notebook_path(source):

@@ -214,7 +214,8 @@ def pairs(paper, most=MOST_PAIRS):
             "change_m3": (pair["volume"] or {}).get("difference_m3"),
         }
         for pair in paper.result["pairs"]
-        if pair["one"] != 0 and not _are_free(all_runs[pair["one"]], all_runs[pair["other"]])
+        if pair["one"] != 0
+        and not (all_runs[pair["one"]]["state"] == all_runs[pair["other"]]["state"] == "free")
     ]
     if not rows:
         return []
@@ -226,11 +227,6 @@ def pairs(paper, most=MOST_PAIRS):
     if len(rows) > len(shown):
         content.append(paper.paragraph("only_largest", shown=len(shown), all=len(rows)))
     return content
-
-
-def _are_free(first, second):
-    """Whether calibrations are only initial values in both runs, so that the results agree."""
-    return first["state"] == second["state"] == "free"
 
 
 def rejections(paper):

@@ -168,13 +168,9 @@ def _conditions(parent, languages):
     }
     for key, (value, unit) in conditions.items():
         if value is not None:
-            _condition(parent, languages, key, value, unit)
-
-
-def _condition(parent, languages, key, value, unit):
-    element = add_child(parent, "influenceCondition", refType=f"tankcal_{key}")
-    add_text(element, "name", languages.label(key))
-    add_real(add_child(element, "data"), key, value, unit, languages.label(key))
+            element = add_child(parent, "influenceCondition", refType=f"tankcal_{key}")
+            add_text(element, "name", languages.label(key))
+            add_real(add_child(element, "data"), key, value, unit, languages.label(key))
 
 
 # ---- results

@@ -35,7 +35,9 @@ def wall(paper):
     ax.plot(targets.arc_m[seen], targets.height_m[seen], ".", color=INK, markersize=3,
             zorder=3, label=paper.word("legend.targets"),
             **rasterize_many(targets.names))  # fmt: skip
-    _control(ax, paper)
+    look = {"color": GREEN, "markersize": 5.5, "markerfacecolor": "none"}
+    positions = [known.xyz_m for known in paper.plan.known]
+    _mark_near(ax, paper, positions, "s", label=paper.word("legend.control"), **look)
     _marks(ax, paper, lost)
     for table in TAPED:
         _ties(ax, paper, table)
@@ -79,12 +81,6 @@ def unrolled_wall(paper, high=2.8, named=False):
     ax.set_xlabel(paper.word("axes.arc"))
     ax.set_ylabel(paper.word("axes.height_above_bottom"))
     return figure, ax
-
-
-def _control(ax, paper):
-    look = {"color": GREEN, "markersize": 5.5, "markerfacecolor": "none"}
-    positions = [known.xyz_m for known in paper.plan.known]
-    _mark_near(ax, paper, positions, "s", label=paper.word("legend.control"), **look)
 
 
 def _mark_near(ax, paper, positions, mark, **look):

@@ -104,7 +104,11 @@ def _obstacles(ax, plan):
         if isinstance(obstacle, Box):
             ax.add_patch(Rectangle(low, *size, **look))
             if size.max() > LONG * size.min() and not is_small:
-                middle = _free_place(plan, low, size)
+                # The name is at the place (2,) along the box that is farthest from all stations.
+                along = np.where(size == size.max(), [[0.25], [0.75], [0.5]], 0.5)
+                places = low + along * size
+                away = np.linalg.norm(places[:, None] - np.array(_places(plan))[:, :2], axis=2)
+                middle = places[away.min(axis=1).argmax()]
                 turned = 90 if size[1] > size[0] else 0
         else:
             ax.add_patch(Circle(obstacle.axis_m, obstacle.radius_m, **look))
@@ -181,14 +185,6 @@ def _stands(ax, plan, places, mark, colour, label):
         label = None
         name = names[0] if len(names) == 1 else f"{names[0]} … {names[-1]}"
         _name_beside(ax, plan, np.array(place), name, 0.1)
-
-
-def _free_place(plan, low, size):
-    """Return the place (2,) along a long box that is farthest from all stations."""
-    along = np.where(size == size.max(), [[0.25], [0.75], [0.5]], 0.5)
-    places = low + along * size
-    away = np.linalg.norm(places[:, None] - np.array(_places(plan))[:, :2], axis=2)
-    return places[away.min(axis=1).argmax()]
 
 
 def _name_beside(ax, plan, place, name, share, colour=GREY, gap=0.0):

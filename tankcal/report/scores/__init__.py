@@ -279,7 +279,10 @@ def draw_errors(paper, method):
         if place >= len(tanks) - across:
             ax.set_xlabel(paper.word("axes.height_scored"))
     set_margins(figure, 0.65, 0.1, 0.75, 0.25, wspace=0.3, hspace=0.45)
-    _draw_legend(figure, grid[0, 0])
+    # Draw a legend below all panels if there are several lines.
+    lines, labels = grid[0, 0].get_legend_handles_labels()
+    if len(labels) > 1:
+        figure.legend(lines, labels, loc="lower center", ncols=min(3, len(labels)), fontsize=7)
     return figure
 
 
@@ -342,13 +345,6 @@ def select_two_tanks(scores):
              for j, b in enumerate(names) if i < j]  # fmt: skip
     best = max(pairs, default=None)
     return best[3:] if best and best[0] > 0 else None
-
-
-def _draw_legend(figure, ax):
-    """Draw a legend below all panels if there are several lines."""
-    lines, labels = ax.get_legend_handles_labels()
-    if len(labels) > 1:
-        figure.legend(lines, labels, loc="lower center", ncols=min(3, len(labels)), fontsize=7)
 
 
 # ---- workbook

@@ -214,10 +214,6 @@ def camera_table(free, words=None):
         Codes of the free parameters.
     words : dict, optional
         Words of the language of the workbook; None: the headings are codes.
-
-    Returns
-    -------
-    Table
     """
     names = words["parameters"] if words else {}
     correlations = tuple(

@@ -42,19 +42,18 @@ def names_alike(aside, names):
     for name in names:
         known.setdefault(normalize_name(name), name)
     return [
-        Problem(file, _is_it(name, known[normalize_name(name)]))
+        Problem(
+            file,
+            message(
+                "is_it",
+                "point {point} could not be adjusted: is it {other}?",
+                point=name,
+                other=known[normalize_name(name)],
+            ),
+        )
         for name, file in aside.items()
         if known.get(normalize_name(name), name) != name
     ][:TOLD]
-
-
-def _is_it(name, other):
-    return message(
-        "is_it",
-        "point {point} could not be adjusted: is it {other}?",
-        point=name,
-        other=other,
-    )
 
 
 def same_place(adjusted):

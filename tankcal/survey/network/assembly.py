@@ -114,10 +114,6 @@ def assemble(survey):
     ----------
     survey : Survey
 
-    Returns
-    -------
-    Problem
-
     Raises
     ------
     SolutionError

@@ -122,10 +122,6 @@ def accuracy(adjusted, points, xyz_m, sd_m):
     points : ndarray of int, shape (k,)
     xyz_m, sd_m : ndarray, shape (k, 3)
         Known coordinates and their standard deviations.
-
-    Returns
-    -------
-    Accuracy
     """
     difference = adjusted.xyz_m[points] - xyz_m
     size = np.linalg.norm(difference, axis=1)

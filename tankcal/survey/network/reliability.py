@@ -430,10 +430,6 @@ def reactions(problem, solution, fixed):
     solution : solver solution
     fixed : ndarray of bool, shape (points, 3)
         Held coordinates to test.
-
-    Returns
-    -------
-    Reactions
     """
     is_used = ~problem.aside
     held = np.flatnonzero(fixed & is_used[:, None] & (problem.layout.points < 0))

@@ -85,10 +85,6 @@ def grow_by_photos(sights, piece, rng, wall=None, least=3):
     wall : Wall, optional
     least : int
         Known points required in a photo: SURE, ENOUGH or 3.
-
-    Returns
-    -------
-    Piece
     """
     if not sights:
         return piece
@@ -412,7 +408,13 @@ def _distances(xyz_m, rays):
         ],
         axis=1,
     )
-    roots = _roots(polynomial)
+    # Roots (t, 4) of polynomials of degree four (t, 5), highest power first.
+    lead = np.where(np.abs(polynomial[:, :1]) > 1e-14, polynomial[:, :1], 1e-14)
+    # Eigenvalues of the companion matrix: all polynomials in one call.
+    companion = np.zeros((len(polynomial), 4, 4))
+    companion[:, 0] = -polynomial[:, 1:] / lead
+    companion[:, [1, 2, 3], [0, 1, 2]] = 1.0
+    roots = np.linalg.eigvals(companion).astype(complex)
     with np.errstate(divide="ignore", invalid="ignore"):
         v = np.where(np.abs(roots.imag) < 1e-3 * np.abs(roots.real), roots.real, np.nan)
         ca, cb, cg, d, b = (item[:, None] for item in (ca, cb, cg, d, b))
@@ -427,16 +429,6 @@ def _distances(xyz_m, rays):
 def _area(xyz):
     """Twice the area (t,) of triangles."""
     return np.linalg.norm(np.cross(xyz[:, 1] - xyz[:, 0], xyz[:, 2] - xyz[:, 0]), axis=1)
-
-
-def _roots(polynomial):
-    """Roots (t, 4) of polynomials of degree four (t, 5), highest power first."""
-    lead = np.where(np.abs(polynomial[:, :1]) > 1e-14, polynomial[:, :1], 1e-14)
-    # Eigenvalues of the companion matrix: all polynomials in one call.
-    companion = np.zeros((len(polynomial), 4, 4))
-    companion[:, 0] = -polynomial[:, 1:] / lead
-    companion[:, [1, 2, 3], [0, 1, 2]] = 1.0
-    return np.linalg.eigvals(companion).astype(complex)
 
 
 def _frame(triangle):

@@ -166,10 +166,6 @@ def interpolation_errors(volume_m3, height_m, breakpoints_m=()):
     breakpoints_m : array_like, optional
         Dips at which the area jumps (joints, limits of deadwood); other breakpoints are not
         required.
-
-    Returns
-    -------
-    Straightness
     """
     rows = np.asarray(height_m, dtype=float)
     breakpoints = np.asarray(breakpoints_m, dtype=float)
@@ -233,10 +229,6 @@ def choose_rows(volume_m3, top_m, bound_m3, breakpoints_m=(), step_m=None, ladde
         Given step of the table, to which only finer zones are added. None: the step is chosen.
     ladder_m : sequence of float, optional
         Available steps, the coarsest first (`LADDERS_M` contains them by unit of heights).
-
-    Returns
-    -------
-    Rows
 
     Raises
     ------

@@ -298,10 +298,6 @@ def dips_of(height_m, volume_m3, factor_m3, wanted_m3):
     wanted_m3 : float or array_like, shape (n,)
         Volumes, m3.
 
-    Returns
-    -------
-    Dips
-
     Raises
     ------
     HeightError

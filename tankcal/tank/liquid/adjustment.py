@@ -462,10 +462,6 @@ def estimate_run_effect(weight, misclosure_m3, run_m3):
     misclosure_m3 : ndarray, shape (n,)
     run_m3 : ndarray, shape (n, runs)
         Misclosures for a run effect of one in each run.
-
-    Returns
-    -------
-    RunEffect or None
     """
     differences, noise = run_differences(weight, misclosure_m3, run_m3)
     if run_m3.shape[1] < 2 or len(noise) < 2:

@@ -92,10 +92,6 @@ def fill_of(metering):
         Object with run, meter, dip_m, used, as in `methods.liquid.readings.Metering`. The rows of a
         run are consecutive and the first row is its start; a blank dip there denotes the empty
         tank. The dip of an unused row is ignored, but its volume entered the tank.
-
-    Returns
-    -------
-    Fill
     """
     runs = tuple(dict.fromkeys(metering.run))
     dips, steps = [], []
@@ -173,10 +169,6 @@ def reduce_steps(metering, fill, volume_m3, growth=None):
         Volumes of the geometry below each dip, loaded by the liquid at the dip, m3.
     growth : array_like, shape (d,), optional
         Factor on the volume below each dip due to the temperature of the shell; None: 1.
-
-    Returns
-    -------
-    ReducedSteps
     """
     volume = np.asarray(volume_m3, dtype=float)
     shell_factors = np.ones(len(volume)) if growth is None else np.asarray(growth, dtype=float)

@@ -45,10 +45,6 @@ def closed_mesh(vertices, faces, *, unit_m=1.0, name="mesh"):
     name : str, optional
         Name of the file, for messages.
 
-    Returns
-    -------
-    Mesh
-
     Raises
     ------
     InputError

@@ -124,10 +124,6 @@ def judge_deviation(limit, table, stated, printed=None):
     stated : StatedVolume
     printed : PrintedU, optional
         Printed uncertainties; None: those of the table.
-
-    Returns
-    -------
-    DeviationVerdict or None
     """
     if (limit.of == "deliveries") != (stated.low_m is not None):
         return None
@@ -152,10 +148,6 @@ def judge_volume(limit, stated, quantity, U):
         Volume for comparison, see `tankcal.tank.capacity`.
     U : float
         Printed expanded uncertainty, m3.
-
-    Returns
-    -------
-    DeviationVerdict
     """
     # The printed U may be that of Monte Carlo: u grows in proportion.
     u = quantity.u_m3 * U / quantity.U_m3 if quantity.U_m3 else 0.0
@@ -237,10 +229,6 @@ def judge_uncertainty(limit, table, lowest_m=None, printed=None):
     printed : PrintedU, optional
         Printed uncertainties; None: those of the table. The search for deliveries uses the U of the
         table; the worst delivery and all simulated deliveries have their printed U.
-
-    Returns
-    -------
-    UncertaintyVerdict
 
     Raises
     ------
@@ -454,10 +442,6 @@ def judge(rule, table, tank, lowest_m=None, stated=(), printed=None):
         Stated volumes for the deviations.
     printed : PrintedU, optional
         Printed uncertainties, such as Monte Carlo's; None: those of the table.
-
-    Returns
-    -------
-    RuleVerdict
 
     Raises
     ------

@@ -115,7 +115,11 @@ def check_sizes(values, kind, raw, log):
     if kind == "horizontal":
         _check_lying(values, raw, log)
     if kind == "vertical":
-        _check_top(values, raw, log)
+        # Check the depth of the head on a vertical tank.
+        form, depth = values["top"]["form"], values["top"]["depth_m"]
+        diameter = values["tank"]["nominal_diameter_m"]
+        if None not in (form, depth, diameter):
+            _check_depth("top", "depth_m", depth, HEADS[form], diameter, raw, log)
 
 
 def _check_inside(values, kind, raw, log):
@@ -225,14 +229,6 @@ def _check_end(given, end, diameter, raw, log):
                 most=most,
             )
             tell(log.warning, raw, "horizontal", f"end_{end}_{name}", text)
-
-
-def _check_top(values, raw, log):
-    """Check the depth of the head on a vertical tank."""
-    form, depth = values["top"]["form"], values["top"]["depth_m"]
-    diameter = values["tank"]["nominal_diameter_m"]
-    if None not in (form, depth, diameter):
-        _check_depth("top", "depth_m", depth, HEADS[form], diameter, raw, log)
 
 
 def _check_depth(section, key, depth, form, diameter, raw, log):
