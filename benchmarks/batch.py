@@ -196,7 +196,7 @@ def sleep(seconds, task):
 
 def measure_sleeping(rows, workers, seconds):
     """Print what the loop itself costs, and how its memory grows."""
-    from tankcal.pipeline.cluster import open_client
+    from tankcal.methods.clouds.cluster import open_client
     from tankcal.products.batch import running
     from tankcal.products.batch.finding import BatchJob
     from tankcal.products.batch.journal import open_folder

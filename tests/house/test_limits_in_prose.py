@@ -29,7 +29,7 @@ from tankcal.job.checks.settings import MAX_TABLE_ROWS
 from tankcal.job.checks.survey import readings as survey_checks
 from tankcal.job.contract import registers
 from tankcal.methods.clouds import bottom as clouds_bottom
-from tankcal.methods.clouds import overlaps
+from tankcal.methods.clouds import cluster, overlaps
 from tankcal.methods.clouds import warnings as clouds_warnings
 from tankcal.methods.clouds.columns import ASSUMED
 from tankcal.methods.great_circles import sphere as circles
@@ -41,8 +41,8 @@ from tankcal.methods.lines import warnings as lines_warnings
 from tankcal.methods.liquid import columns as liquid_columns
 from tankcal.methods.liquid import facts as liquid_facts
 from tankcal.methods.strapping import tape_warnings
-from tankcal.pipeline import cluster, scanned_solids
 from tankcal.pipeline import overruling_effects as overruling
+from tankcal.pipeline import scanned_solids
 from tankcal.pipeline import simulation as simulation_model
 from tankcal.pipeline.checks import wall as wall_checks
 from tankcal.pipeline.liquid import adjustment as liquid_steps

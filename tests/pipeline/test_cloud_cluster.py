@@ -28,6 +28,7 @@ from tankcal.clouds.wall.cells import SUMMED, CellGrid
 from tankcal.clouds.wall.start import CylinderSurface
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
+from tankcal.methods.clouds import cluster
 from tankcal.methods.clouds import passes as cloud_cluster
 from tankcal.methods.clouds import wall as cloud_wall
 from tankcal.methods.clouds.passes import (
@@ -40,7 +41,6 @@ from tankcal.methods.clouds.passes import (
     open_passes,
 )
 from tankcal.methods.clouds.readings import CloudFile
-from tankcal.pipeline import cluster
 from tankcal.record import record_of
 from tankcal.survey.scans import ScanSetup
 from tankcal.survey.wall_hits import RangingInstrument

@@ -29,7 +29,13 @@ from tankcal.clouds.wall.cells import WallCells
 from tankcal.clouds.wall.passes import sample_points, sum_cells
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.pipeline.cluster import Watch, count_cores, failures_told, is_installed, open_client
+from tankcal.methods.clouds.cluster import (
+    Watch,
+    count_cores,
+    failures_told,
+    is_installed,
+    open_client,
+)
 from tankcal.survey.readings import certified_distance_m
 
 TOLD_EVERY_S = 0.5  # s between two reports of progress

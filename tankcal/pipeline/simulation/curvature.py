@@ -58,17 +58,16 @@ def vary_input(job, name, change):
     if name in _OF_VALUES:
         part, key = _OF_VALUES[name]
         return _vary_value(job, part, key, change)
-    if name in ("plate_thickness", "paint") and job.courses:
-        key = {"plate_thickness": "thickness_m", "paint": "paint_m"}[name]
-        courses = (
-            replace(course, **{key: getattr(course, key) + change}) for course in job.courses
-        )
-        return replace(job, courses=tuple(courses))
-    if name in ("plate_thickness", "paint") and job.rings:
-        key = {"plate_thickness": "thickness_m", "paint": "paint_m"}[name]
-        rings = tuple(replace(ring, **{key: getattr(ring, key) + change}) for ring in job.rings)
-        moved = replace(job, rings=rings)
-        return moved if name == "paint" else _vary_solid(moved, name, change)
+    kind = "courses" if job.courses else "rings"
+    parts, key = (
+        getattr(job, kind),
+        {"plate_thickness": "thickness_m", "paint": "paint_m"}.get(name),
+    )
+    if parts and key:
+        parts = tuple(replace(part, **{key: getattr(part, key) + change}) for part in parts)
+        moved = replace(job, **{kind: parts})
+        is_whole = job.courses or name == "paint"
+        return moved if is_whole else _vary_solid(moved, name, change)
     if job.tank.kind == "vertical":
         return _vary_head(job, name, change)
     if job.points is not None:

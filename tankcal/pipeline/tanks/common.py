@@ -47,11 +47,12 @@ def estimates_of(job):
     no value, nor have plates or paint that differ between courses.
     """
     survey, table, material = job.survey, job.table, job.material
+    parts, solids = job.courses or job.rings, list(filter(None, (job.horizontal, job.sphere)))
     values_of_inputs = {
         **dict.fromkeys(("scale", "datum", "offset", "bottom", "barrel", "taper", "deadwood"), 0.0),
         "surface": 0.0,
-        "plate_thickness": _only([1000 * part.thickness_m for part in job.courses or job.rings]),
-        "paint": _only([1000 * part.paint_m for part in job.courses or job.rings]),
+        "plate_thickness": _only([1000 * part.thickness_m for part in parts or solids]),
+        "paint": _only([1000 * part.paint_m for part in parts]),
         "shell_temperature": survey.shell_temperature_c,
         "expansion": material.expansion_per_k,
         "youngs_modulus": material.e_pa / 1e9,
@@ -90,9 +91,8 @@ def _sizes_of_solid(job):
     lying, solid = job.horizontal, job.horizontal or job.sphere
     if solid is None:
         return {}
-    plate = {} if job.rings else {"plate_thickness": 1000 * solid.thickness_m}
     if lying is None:
-        return {**plate, "diameter": _thousand(solid.diameter_m)}
+        return {"diameter": _thousand(solid.diameter_m)}
     round_m = lying.width_m if lying.width_m == lying.height_m else None
     ends = (lying.end_a, lying.end_b)
     depths, dishes, knuckles = (
@@ -100,7 +100,6 @@ def _sizes_of_solid(job):
         for key in ("depth_m", "dish_radius_m", "knuckle_radius_m")
     )
     return {
-        **plate,
         "diameter": _thousand(round_m),
         "length": _thousand(lying.length_m),
         "end_depth": _only(depths),

@@ -23,7 +23,13 @@ from pathlib import Path
 import tankcal
 from tankcal.errors import Problem, problem_of, reason_of
 from tankcal.messages import message
-from tankcal.pipeline.cluster import Watch, count_cores, failures_told, is_installed, open_client
+from tankcal.methods.clouds.cluster import (
+    Watch,
+    count_cores,
+    failures_told,
+    is_installed,
+    open_client,
+)
 from tankcal.products.batch.finding import find_former_or_none, find_jobs
 from tankcal.products.batch.journal import compute_keys, open_folder
 from tankcal.products.batch.options import FOLDERS, refuse_incomplete, refuse_unreadable
