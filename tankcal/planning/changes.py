@@ -51,10 +51,6 @@ class Change:
 def cost_of(plan):
     """Total cost of the items of a plan.
 
-    Parameters
-    ----------
-    plan : Plan
-
     Returns
     -------
     float

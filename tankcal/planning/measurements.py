@@ -84,10 +84,6 @@ def _control(plan):
 def targets_of(plan):
     """Return the targets of a plan as the table targets.csv of a survey.
 
-    Parameters
-    ----------
-    plan : Plan
-
     Returns
     -------
     Targets

@@ -65,10 +65,6 @@ def place_of(plan, xyz_m):
 def reference_rad(plan):
     """Azimuth of the reference weld: azimuth of a target minus its arc along the wall.
 
-    Parameters
-    ----------
-    plan : Plan
-
     Returns
     -------
     float
@@ -89,10 +85,6 @@ def wall_radius_m(plan, height_m):
 
 def joints_m(plan):
     """Heights of the joints of the courses above the bottom.
-
-    Parameters
-    ----------
-    plan : Plan
 
     Returns
     -------

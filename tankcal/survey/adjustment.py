@@ -492,11 +492,6 @@ def readings_of(adjusted, held, held_trace):
 def gone_with_their_points(adjusted, removed):
     """Reading rows of rejected observations whose points are no longer adjusted.
 
-    Parameters
-    ----------
-    adjusted : network.Adjusted
-    removed : sequence of network.snooping.Removed
-
     Returns
     -------
     list of Reading

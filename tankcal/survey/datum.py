@@ -54,12 +54,6 @@ class Frame:
 def make_frame(survey, gathered, settings):
     """Choose the datum of a survey with start values.
 
-    Parameters
-    ----------
-    survey : network.Survey
-    gathered : GatheredSurvey
-    settings : AdjustmentSettings
-
     Returns
     -------
     Frame

@@ -86,10 +86,6 @@ class KnownControl:
 def gather(measurements):
     """Convert Measurements to a GatheredSurvey.
 
-    Parameters
-    ----------
-    measurements : Measurements
-
     Raises
     ------
     InputError
@@ -414,11 +410,6 @@ def rows_of(correlated, table):
 
 def blocks_of(measurements, observations):
     """Return the Blocks of correlated values of a survey's observations.
-
-    Parameters
-    ----------
-    measurements : Measurements
-    observations : sequence of Observations
 
     Returns
     -------

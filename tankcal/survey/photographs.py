@@ -16,10 +16,6 @@ FEWEST = 3  # image points required in a photo
 def gathered_photos(measurements):
     """Collect the photos with image points.
 
-    Parameters
-    ----------
-    measurements : Measurements
-
     Returns
     -------
     photos : network.Photos or None

@@ -79,11 +79,6 @@ def poses_in_network(tangents, adjustment):
 
     A set-up outside the network has the tie "wall": its position is unknown.
 
-    Parameters
-    ----------
-    tangents : Tangents
-    adjustment : Adjustment
-
     Returns
     -------
     poses : Poses

@@ -451,10 +451,6 @@ def reject_scattered(measurements):
     If the sample standard deviation in x or y exceeds settings.reading_limit_mm, all readings of
     the point in that photo are rejected. The scatter does not show which reading is wrong (Silva).
 
-    Parameters
-    ----------
-    measurements : Measurements
-
     Returns
     -------
     measurements : Measurements

@@ -254,10 +254,6 @@ def datum_dependence(report):
     Coordinates and their standard deviations belong to the datum; shape and its standard deviations
     do not.
 
-    Parameters
-    ----------
-    report : DatumReport
-
     Returns
     -------
     Dependence

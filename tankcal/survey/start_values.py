@@ -100,11 +100,6 @@ def add_start_values(gathered, measurements):
     Control determines the frame; nominal coordinates are transformed to it. Photos and points
     without values receive them from the observations.
 
-    Parameters
-    ----------
-    gathered : GatheredSurvey
-    measurements : Measurements
-
     Returns
     -------
     network.Survey
@@ -133,12 +128,6 @@ def add_start_values(gathered, measurements):
 
 def start_like(adjusted, gathered, measurements):
     """Start a survey from an adjusted survey of the same points and photos.
-
-    Parameters
-    ----------
-    adjusted : network.Adjusted
-    gathered : GatheredSurvey
-    measurements : Measurements
 
     Returns
     -------
@@ -261,12 +250,6 @@ def _move_to_frame_of(known, nominal, radius_m):
 
 def finish_start_values(survey, gathered, measurements):
     """Complete start values: known coordinates, systems, and curvature of the earth.
-
-    Parameters
-    ----------
-    survey : network.Survey
-    gathered : GatheredSurvey
-    measurements : Measurements
 
     Returns
     -------

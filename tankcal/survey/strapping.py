@@ -476,11 +476,6 @@ def pull_of(strap, tape):
 def strain_of(strap, tape):
     """Strain relative to the certificate, and its derivatives by relative pull and friction.
 
-    Parameters
-    ----------
-    strap : Strap
-    tape : Tape
-
     Returns
     -------
     tuple of (float, float, float)

@@ -310,11 +310,6 @@ class Homogeneity:
 def homogeneity_of(job, wall):
     """`Homogeneity` of the sections of a wall surveyed by points.
 
-    Parameters
-    ----------
-    job : Job
-    wall : Wall
-
     Returns
     -------
     Homogeneity or None
@@ -379,11 +374,6 @@ def _test_of(section, noise, p, differs):
 
 def warn_of_sections(job, wall):
     """Warnings of sections whose noise differs, or disagrees with the stated covariance.
-
-    Parameters
-    ----------
-    job : Job
-    wall : Wall
 
     Returns
     -------

@@ -113,10 +113,6 @@ class LiquidFound:
 def adjust_liquid(geometry):
     """Adjust the metered runs of a job together with a `Geometry`.
 
-    Parameters
-    ----------
-    geometry : Geometry
-
     Returns
     -------
     LiquidFound

@@ -88,11 +88,6 @@ class ToldCause:
 def told_causes(job, wall):
     """Return a `ToldCause` for each instrument offset and scale that the points of a wall share.
 
-    Parameters
-    ----------
-    job : Job
-    wall : Wall
-
     Returns
     -------
     tuple of ToldCause

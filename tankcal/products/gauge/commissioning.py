@@ -36,10 +36,6 @@ MM = 1000.0
 def commission(comparison):
     """Compute the deviation, corrections, zeros and decision of a comparison.
 
-    Parameters
-    ----------
-    comparison : reading.Comparison
-
     Returns
     -------
     saved.GaugeFile

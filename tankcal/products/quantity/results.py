@@ -97,10 +97,6 @@ def _numbers(values):
 def check_output(path):
     """Refuse a file that `write_rows` must not replace.
 
-    Parameters
-    ----------
-    path : Path
-
     Raises
     ------
     InputError

@@ -455,10 +455,6 @@ class Asked:
 def compare_files(asked) -> ComparisonFile:
     """Compare the tables in two files; report all problems of all files together.
 
-    Parameters
-    ----------
-    asked : Asked
-
     Returns
     -------
     record.comparison.ComparisonFile

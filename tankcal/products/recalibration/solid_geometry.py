@@ -347,10 +347,6 @@ class LyingGeometry:
 def fit_sphere(former: FormerTable) -> SolidFit:
     """Estimate diameter and zero of a spherical tank from its table.
 
-    Parameters
-    ----------
-    former : FormerTable
-
     Returns
     -------
     SolidFit
@@ -527,10 +523,6 @@ def _edge(is_near, inside, outside):
 
 def size_sections(fit: SolidFit) -> dict:
     """Return the sections of job.toml with the dimensions: [horizontal] or [sphere], and [datum].
-
-    Parameters
-    ----------
-    fit : SolidFit
 
     Returns
     -------

@@ -235,10 +235,6 @@ _CREATOR = "tankcal ticket"  # identifies a booklet, which may be replaced
 def refuse_foreign_booklet(path):
     """Refuse to replace a file that `write_booklet` did not write.
 
-    Parameters
-    ----------
-    path : Path
-
     Raises
     ------
     InputError

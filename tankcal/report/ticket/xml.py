@@ -38,10 +38,6 @@ _LINK = "docs/ticket.md"  # page of tankcal on its types
 def ticket_xml(paper):
     """Return the ticket as XML; its language comes first and is authoritative.
 
-    Parameters
-    ----------
-    paper : TicketPaper
-
     Returns
     -------
     bytes

@@ -192,10 +192,6 @@ START_M = 0.1  # standard deviation of a position before the adjustment
 def gross_readings(survey):
     """Find readings far from the start values.
 
-    Parameters
-    ----------
-    survey : network.Survey
-
     Returns
     -------
     dict
@@ -302,11 +298,6 @@ def _refuse_mirrored(survey, off_mm, rows):
 
 def find_one_sided_losses(readings, known):
     """Problem rows on items that lost far more of their values than all others.
-
-    Parameters
-    ----------
-    readings : Readings
-    known : Known
 
     Returns
     -------

@@ -110,10 +110,6 @@ class Problem:
 def assemble(survey):
     """Assemble the Problem of a survey.
 
-    Parameters
-    ----------
-    survey : Survey
-
     Raises
     ------
     SolutionError
@@ -306,10 +302,6 @@ def _centre(survey):
 
 def _interior(survey):
     """Interior parameters of the photos.
-
-    Parameters
-    ----------
-    survey : Survey
 
     Returns
     -------
