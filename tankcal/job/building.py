@@ -215,7 +215,7 @@ def _tell_empty_lists(raw, tables, log):
 _IN_PLACE_OF_POINTS = {  # straps last: other methods have an empty table of them beside their own
     method.readings_table: no_rows
     for method in sorted(methods(), key=lambda method: (not method.register, method.comes_last))
-    if (no_rows := method.no_rows())
+    if (no_rows := method.no_rows)
 }
 
 

@@ -11,6 +11,7 @@ its own within the function that needs it, so that a job loads only the methods 
 from collections import Counter
 from functools import cache, partial
 from importlib import import_module
+from typing import ClassVar
 
 from tankcal.entry_points import find_entry_points
 
@@ -124,6 +125,10 @@ class Method:
         Output files of `csv_tables`.
     hidden_sheets : tuple of str
         Sheets of the workbook for other programs, which are hidden.
+    section_notes, table_notes : dict
+        English notes in a starter above the sections of job.toml and above the tables.
+    no_rows : Message or None
+        Problem of a table of readings without rows, in place of points; None: no problem.
     saved_note : str
         Description of the saved part in the JSON schema of the record.
     """
@@ -159,6 +164,9 @@ class Method:
     kind_of_readings = ""
     csv_files = ()
     hidden_sheets = ()
+    section_notes: ClassVar = {}
+    table_notes: ClassVar = {}
+    no_rows = None
     saved_note = ""
 
     @property
@@ -193,14 +201,6 @@ class Method:
         """Initial values of settings in a starter job for a kind of tank: {"survey.side": text}."""
         return {}
 
-    def section_notes(self):
-        """English notes above the sections of job.toml in a starter: {section: note}."""
-        return {}
-
-    def table_notes(self):
-        """English notes above the tables in a starter: {table: note}."""
-        return {}
-
     def examples(self):
         """Example rows for the notes of a starter: {table: list of {column: value}}."""
         return {}
@@ -219,9 +219,6 @@ class Method:
         """
         table = tables.get(self.readings_table)
         return table is not None and bool(table.rows or table.skipped)
-
-    def no_rows(self):
-        """Message about a table of readings without rows, in place of points; None: no message."""
 
     def check(self, values, tables, registers, raw, log):
         """Report problems of the tables and settings to `log`; called with or without readings.

@@ -76,8 +76,8 @@ TABLE_NOTES = {
     "stadia": "one row for each reading of a stadia bar from a set-up; may stay empty",
 }
 for _method in methods():
-    SECTION_NOTES |= _method.section_notes()
-    TABLE_NOTES |= _method.table_notes()
+    SECTION_NOTES |= _method.section_notes
+    TABLE_NOTES |= _method.table_notes
 REGISTER_NOTES = {
     "cameras": "one section for each camera; put its name, as in photos.csv, in place of NAME",
     "instruments": "one section for each instrument; put its name in place of NAME; may stay empty",

@@ -1,6 +1,9 @@
 """Point clouds: files of scanners, whose cells become points of the wall."""
 
-from tankcal.methods.base import Method
+from typing import ClassVar
+
+from tankcal.messages import message
+from tankcal.methods.base import Delegate, Import, Method
 
 
 class CloudsMethod(Method):
@@ -20,10 +23,7 @@ class CloudsMethod(Method):
 
     # ---- job
 
-    def columns(self):
-        from tankcal.methods.clouds.columns import COLUMNS
-
-        return COLUMNS
+    columns = Import("tankcal.methods.clouds.columns:COLUMNS")
 
     def register_fields(self):
         from tankcal.methods.clouds.columns import CLOUD
@@ -35,35 +35,17 @@ class CloudsMethod(Method):
 
         return (*self.tables, *BESIDE)
 
-    def table_notes(self):
-        return {"scan_targets": "one row for each target in each scan; may stay empty"}
+    table_notes: ClassVar = {"scan_targets": "one row for each target in each scan; may stay empty"}
 
-    def setting_examples(self):
-        from tankcal.methods.clouds.columns import SETTING_EXAMPLES
+    setting_examples = Import("tankcal.methods.clouds.columns:SETTING_EXAMPLES")
+    examples = Import("tankcal.methods.clouds.columns:EXAMPLES")
 
-        return SETTING_EXAMPLES
+    no_rows = message(
+        "no_cloud_at_all", "nothing filled in; expected a section for each file of a scanner"
+    )
 
-    def examples(self):
-        from tankcal.methods.clouds.columns import EXAMPLES
-
-        return EXAMPLES
-
-    def no_rows(self):
-        from tankcal.messages import message
-
-        return message(
-            "no_cloud_at_all", "nothing filled in; expected a section for each file of a scanner"
-        )
-
-    def check(self, values, tables, registers, raw, log):
-        from tankcal.methods.clouds.checks import check_clouds
-
-        check_clouds(values, tables, registers, raw, log)
-
-    def read(self, values, tables, registers, raw):
-        from tankcal.methods.clouds.readings import make_clouds
-
-        return make_clouds(values, tables, registers, raw)
+    check = Delegate("tankcal.methods.clouds.checks:check_clouds")
+    read = Delegate("tankcal.methods.clouds.readings:make_clouds")
 
     # ---- pipeline
 
@@ -83,22 +65,12 @@ class CloudsMethod(Method):
         )
         return Surveyed(job, survey, sights={"clouds": clouded})
 
-    def warnings(self, job, survey, sights=None):
-        from tankcal.methods.clouds.warnings import check_clouds
-
-        return check_clouds(job, survey, sights)
+    warnings = Delegate("tankcal.methods.clouds.warnings:check_clouds")
 
     # ---- record
 
-    def saved_type(self):
-        from tankcal.methods.clouds.saved import CloudsRecord
-
-        return CloudsRecord
-
-    def save(self, result):
-        from tankcal.methods.clouds.saved import save_clouds
-
-        return save_clouds(result)
+    saved_type = Import("tankcal.methods.clouds.saved:CloudsRecord")
+    save = Delegate("tankcal.methods.clouds.saved:save_clouds")
 
     def choices(self, result):
         if result.wall is None:
@@ -107,20 +79,9 @@ class CloudsMethod(Method):
 
     # ---- report
 
-    def report_tables(self):
-        from tankcal.methods.clouds import tables
-
-        return tables
-
-    def report_figures(self):
-        from tankcal.methods.clouds import figures
-
-        return figures
-
-    def facts(self):
-        from tankcal.methods.clouds.facts import FACTS
-
-        return FACTS
+    report_tables = Import("tankcal.methods.clouds.tables")
+    report_figures = Import("tankcal.methods.clouds.figures")
+    facts = Import("tankcal.methods.clouds.facts:FACTS")
 
     def sheets(self, record):
         tables = [table for table in self.report_tables().TABLES if table.rows(record)]

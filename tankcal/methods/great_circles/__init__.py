@@ -1,5 +1,7 @@
 """Strapping of a sphere: equator and meridians by tape, and the ellipsoid that they determine."""
 
+from typing import ClassVar
+
 from tankcal.methods.base import Delegate, Import, Method
 
 
@@ -27,9 +29,10 @@ class GreatCirclesMethod(Method):
     def starter_settings(self, kind):
         return {"survey.side": "outside"}
 
-    def table_notes(self):
-        note = "one row for each reading of the tape round the sphere: equator and meridians"
-        return {"great_circles": note}
+    table_notes: ClassVar = {
+        "great_circles": "one row for each reading of the tape round the sphere: equator and"
+        " meridians"
+    }
 
     def examples(self):
         from tankcal.methods.great_circles.columns import EXAMPLES

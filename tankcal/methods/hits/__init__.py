@@ -1,6 +1,9 @@
 """Wall hits: distances of a total station to the bare wall, without a target."""
 
-from tankcal.methods.base import Method
+from typing import ClassVar
+
+from tankcal.messages import message
+from tankcal.methods.base import Delegate, Import, Method
 
 
 class HitsMethod(Method):
@@ -26,32 +29,19 @@ class HitsMethod(Method):
 
     # ---- job
 
-    def columns(self):
-        from tankcal.methods.hits.columns import COLUMNS
+    columns = Import("tankcal.methods.hits.columns:COLUMNS")
 
-        return COLUMNS
+    table_notes: ClassVar = {
+        "wall_hits": "one row for each sight to the bare wall, without a target",
+        "control_readings": "one row for each reading of a control target: at the start, every"
+        " half hour and at the end; may stay empty",
+    }
 
-    def table_notes(self):
-        return {
-            "wall_hits": "one row for each sight to the bare wall, without a target",
-            "control_readings": "one row for each reading of a control target: at the start, every"
-            " half hour and at the end; may stay empty",
-        }
+    examples = Import("tankcal.methods.hits.columns:EXAMPLES")
 
-    def examples(self):
-        from tankcal.methods.hits.columns import EXAMPLES
+    no_rows = message("no_rows_of_hits", "no rows; expected a sight to the wall in each")
 
-        return EXAMPLES
-
-    def no_rows(self):
-        from tankcal.messages import message
-
-        return message("no_rows_of_hits", "no rows; expected a sight to the wall in each")
-
-    def check(self, values, tables, registers, raw, log):
-        from tankcal.methods.hits.readings import check_hits
-
-        check_hits(values, tables, registers, raw, log)
+    check = Delegate("tankcal.methods.hits.readings:check_hits")
 
     def may_see_both_sides(self, tables):
         return len(set(tables["wall_hits"].of("setup"))) > 1
@@ -63,10 +53,7 @@ class HitsMethod(Method):
 
     # ---- known walls
 
-    def observe(self, job, wall, errors):
-        from tankcal.methods.hits.readings import observe_hits
-
-        return observe_hits(job, wall, errors)
+    observe = Delegate("tankcal.methods.hits.readings:observe_hits")
 
     def levels_read(self, job):
         from tankcal.methods.hits.readings import levels_of_hits
@@ -90,32 +77,19 @@ class HitsMethod(Method):
         )
         return Surveyed(job_of_points, wall, sights={"hits": sighting})
 
-    def warnings(self, job, survey, sights=None):
-        from tankcal.methods.hits.warnings import check_hits
-
-        return check_hits(job, survey, sights)
+    warnings = Delegate("tankcal.methods.hits.warnings:check_hits")
 
     # ---- record
 
-    def saved_type(self):
-        from tankcal.methods.hits.saved import HitsRecord
-
-        return HitsRecord
-
-    def save(self, result):
-        from tankcal.methods.hits.saved import save_hits
-
-        return save_hits(result)
+    saved_type = Import("tankcal.methods.hits.saved:HitsRecord")
+    save = Delegate("tankcal.methods.hits.saved:save_hits")
 
     def choices(self, result):
         return {"survey": "wall_hits", "covariance": "hits"}
 
     # ---- report
 
-    def report_tables(self):
-        from tankcal.methods.hits import tables
-
-        return tables
+    report_tables = Import("tankcal.methods.hits.tables")
 
     def sheets(self, record):
         declared = self.report_tables()

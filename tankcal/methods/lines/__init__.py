@@ -1,5 +1,7 @@
 """Reference lines: offsets of the wall from vertical lines of sight, beside straps or points."""
 
+from typing import ClassVar
+
 from tankcal.methods.base import Delegate, Import, Method
 
 
@@ -31,12 +33,11 @@ class LinesMethod(Method):
     def starter_settings(self, kind):
         return {"survey.side": "outside", "datum.bottom_z_m": "0.0"}
 
-    def table_notes(self):
-        return {
-            "lines": "one row for each vertical line of sight round the tank",
-            "offsets": "one row for each reading of the wall's offset; repeated readings are"
-            " repeated rows",
-        }
+    table_notes: ClassVar = {
+        "lines": "one row for each vertical line of sight round the tank",
+        "offsets": "one row for each reading of the wall's offset; repeated readings are"
+        " repeated rows",
+    }
 
     examples = Import("tankcal.methods.lines.columns:EXAMPLES")
 

@@ -1,5 +1,8 @@
 """Metered liquid: runs between dips, adjusted together with the geometry of the tank."""
 
+from typing import ClassVar
+
+from tankcal.messages import message
 from tankcal.methods.base import Delegate, Import, Method
 
 
@@ -36,28 +39,21 @@ class LiquidMethod(Method):
 
         return STARTS if kind == "vertical" else {}
 
-    def section_notes(self):
-        return {
-            "liquid": "the liquid that was metered into the tank, and how well its dips were read"
-        }
+    section_notes: ClassVar = {
+        "liquid": "the liquid that was metered into the tank, and how well its dips were read"
+    }
 
-    def table_notes(self):
-        return {
-            "liquid": "one row for the start of each run, and one for each batch with the dip"
-            " after it"
-        }
+    table_notes: ClassVar = {
+        "liquid": "one row for the start of each run, and one for each batch with the dip after it"
+    }
 
     setting_examples = Import("tankcal.methods.liquid.columns:SETTING_EXAMPLES")
     examples = Import("tankcal.methods.liquid.columns:EXAMPLES")
 
-    def no_rows(self):
-        from tankcal.messages import message
-
-        return message(
-            "no_rows_of_liquid",
-            "no rows; expected the start of each run, and a row for each batch and the dip after"
-            " it",
-        )
+    no_rows = message(
+        "no_rows_of_liquid",
+        "no rows; expected the start of each run, and a row for each batch and the dip after it",
+    )
 
     def check(self, values, tables, registers, raw, log):
         from tankcal.methods.liquid.checks import check_liquid, tell_without_rows

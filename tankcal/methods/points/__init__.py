@@ -1,5 +1,7 @@
 """Points of the wall: as given, or from the adjustment of a network."""
 
+from typing import ClassVar
+
 from tankcal.methods.base import Import, Method
 
 
@@ -19,8 +21,7 @@ class PointsMethod(Method):
 
         return {"points": POINTS}
 
-    def table_notes(self):
-        return {"points": "one row for each surveyed point of the wall"}
+    table_notes: ClassVar = {"points": "one row for each surveyed point of the wall"}
 
     examples = Import("tankcal.methods.points.columns:EXAMPLES")
 

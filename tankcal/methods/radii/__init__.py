@@ -1,5 +1,8 @@
 """Radii of the courses by a former table, a record or a declaration, alone or with a survey."""
 
+from typing import ClassVar
+
+from tankcal.messages import message
 from tankcal.methods.base import Delegate, Import, Method
 
 
@@ -27,16 +30,15 @@ class RadiiMethod(Method):
     def starter_settings(self, kind):
         return {"survey.side": "inside", "datum.bottom_z_m": "0.0"}
 
-    def section_notes(self):
-        return {
-            "radii": "the radii of radii.csv: where they come from, and how well they are known",
-            "change": "only beside a new survey of some courses: how far the radii may have"
-            " changed since",
-        }
+    section_notes: ClassVar = {
+        "radii": "the radii of radii.csv: where they come from, and how well they are known",
+        "change": "only beside a new survey of some courses: how far the radii may have"
+        " changed since",
+    }
 
-    def table_notes(self):
-        note = "one row for each course, with its radius as a former table or a record has it"
-        return {"radii": note}
+    table_notes: ClassVar = {
+        "radii": "one row for each course, with its radius as a former table or a record has it"
+    }
 
     setting_examples = Import("tankcal.methods.radii.columns:SETTING_EXAMPLES")
 
@@ -45,10 +47,7 @@ class RadiiMethod(Method):
 
         return {"radii": list(EXAMPLES)}
 
-    def no_rows(self):
-        from tankcal.messages import message
-
-        return message("no_rows_of_radii", "no rows; expected the radius of each course")
+    no_rows = message("no_rows_of_radii", "no rows; expected the radius of each course")
 
     def check(self, values, tables, registers, raw, log):
         from tankcal.methods.radii.readings import check_radii

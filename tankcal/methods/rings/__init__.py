@@ -1,5 +1,7 @@
 """Strapped rings of a horizontal cylinder: circumferences by tape, ring by ring."""
 
+from typing import ClassVar
+
 from tankcal.methods.base import Delegate, Import, Method
 
 
@@ -25,8 +27,9 @@ class RingsMethod(Method):
     def starter_tables(self):
         return (*self.shared_tables, *self.tables)
 
-    def table_notes(self):
-        return {"rings": "one row for each ring (of plates) of the cylinder, from end A to end B"}
+    table_notes: ClassVar = {
+        "rings": "one row for each ring (of plates) of the cylinder, from end A to end B"
+    }
 
     examples = Import("tankcal.methods.rings.columns:EXAMPLES")
     check = Delegate("tankcal.methods.rings.readings:check_rings")

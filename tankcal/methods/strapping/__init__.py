@@ -1,5 +1,8 @@
 """Strapping: circumferences by tape of an upright tank, alone or beside points of its wall."""
 
+from typing import ClassVar
+
+from tankcal.messages import message
 from tankcal.methods.base import Delegate, Import, Method
 
 
@@ -38,30 +41,26 @@ class StrappingMethod(Method):
     def starter_settings(self, kind):
         return {"survey.side": "outside", "datum.bottom_z_m": "0.0"}
 
-    def section_notes(self):
-        return {
-            "shell": "how far the wall is from a circle",
-            "strapping": "how the tape lay",
-        }
+    section_notes: ClassVar = {
+        "shell": "how far the wall is from a circle",
+        "strapping": "how the tape lay",
+    }
 
-    def table_notes(self):
-        return {
-            "circumferences": "one row for each reading of the tape round the tank",
-            "obstructions": "one row for each kind of obstacle on the way of a circumference; may"
-            " stay empty",
-            "thickness": "one row for each reading of a gauge of plates; may stay empty",
-            "tape_checks": "one row for each comparison of the working tape with its master; may"
-            " stay empty",
-        }
+    table_notes: ClassVar = {
+        "circumferences": "one row for each reading of the tape round the tank",
+        "obstructions": "one row for each kind of obstacle on the way of a circumference; may"
+        " stay empty",
+        "thickness": "one row for each reading of a gauge of plates; may stay empty",
+        "tape_checks": "one row for each comparison of the working tape with its master; may"
+        " stay empty",
+    }
 
     setting_examples = Import("tankcal.methods.strapping.columns:SETTING_EXAMPLES")
     examples = Import("tankcal.methods.strapping.columns:EXAMPLES")
 
-    def no_rows(self):
-        from tankcal.messages import message
-
-        text = "no rows; expected a reading of the tape on each course at least"
-        return message("no_circumferences", text)
+    no_rows = message(
+        "no_circumferences", "no rows; expected a reading of the tape on each course at least"
+    )
 
     def check(self, values, tables, registers, raw, log):
         from tankcal.job.entries import kind_of

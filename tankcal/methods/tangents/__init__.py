@@ -1,5 +1,8 @@
 """Tangents: sights to both limbs of an upright tank, from a traverse round it."""
 
+from typing import ClassVar
+
+from tankcal.messages import message
 from tankcal.methods.base import Delegate, Import, Method
 
 
@@ -35,18 +38,16 @@ class TangentsMethod(Method):
     def starter_settings(self, kind):
         return {"survey.side": "outside"}
 
-    def table_notes(self):
-        return {"tangents": "one row for each sight to a limb of the tank, from outside"}
+    table_notes: ClassVar = {
+        "tangents": "one row for each sight to a limb of the tank, from outside"
+    }
 
     def examples(self):
         from tankcal.methods.tangents.columns import EXAMPLES
 
         return {"tangents": list(EXAMPLES)}
 
-    def no_rows(self):
-        from tankcal.messages import message
-
-        return message("no_rows_of_tangents", "no rows; expected a sight to a limb in each")
+    no_rows = message("no_rows_of_tangents", "no rows; expected a sight to a limb in each")
 
     def check(self, values, tables, registers, raw, log):
         if self.is_given(tables):
