@@ -57,11 +57,6 @@ def message(code, template, **values):
 def printable(text):
     """Escape the control characters of a text, so that a file name cannot control a terminal.
 
-    Parameters
-    ----------
-    text : object
-        Text, or object with a text.
-
     Returns
     -------
     str
@@ -76,11 +71,6 @@ def printable(text):
 
 def printable_lines(text):
     """Escape the control characters of a text, except tabs and line breaks.
-
-    Parameters
-    ----------
-    text : object
-        Text, or object with a text.
 
     Returns
     -------
@@ -118,11 +108,6 @@ def list_some(names, most):
 def join_with_and(parts):
     """Join texts with "and" before the last text; a single text is returned unchanged.
 
-    Parameters
-    ----------
-    parts : sequence of str
-        The texts.
-
     Returns
     -------
     Message or str
@@ -133,11 +118,6 @@ def join_with_and(parts):
 
 def join_with_or(parts):
     """Join texts with "or" before the last text; a single text is returned unchanged.
-
-    Parameters
-    ----------
-    parts : sequence of str
-        The texts.
 
     Returns
     -------

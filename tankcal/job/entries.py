@@ -113,15 +113,6 @@ def read_register(raw, name, log):
     An entry whose keys are all blank is ignored. A family of keys, such as marks, is a single value
     {name in the family: value}, without blank and invalid items.
 
-    Parameters
-    ----------
-    raw : RawJob
-        Job as read.
-    name : str
-        "cameras", "instruments", "clouds" or "meters".
-    log : Log
-        Receives the problems.
-
     Returns
     -------
     dict of {str: dict}

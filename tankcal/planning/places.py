@@ -97,11 +97,6 @@ def joints_m(plan):
 def full_turn(angle_rad):
     """Reduce angles to 0 to 2 pi; a full turn within rounding becomes 0.
 
-    Parameters
-    ----------
-    angle_rad : array_like
-        Angles, rad.
-
     Returns
     -------
     ndarray

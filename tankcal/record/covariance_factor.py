@@ -67,11 +67,6 @@ def factor_of(capacity):
 
     The kept rows are added in their order, so that all machines give the same bits.
 
-    Parameters
-    ----------
-    capacity : dict
-        Part of a record.
-
     Returns
     -------
     ndarray, shape (rows, inputs)

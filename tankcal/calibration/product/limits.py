@@ -174,11 +174,6 @@ def shipped_limits(name=SHIPPED):
 def read_limits(path):
     """Read a table of limits from a TOML file.
 
-    Parameters
-    ----------
-    path : path-like
-        Path of the file.
-
     Returns
     -------
     LimitTable

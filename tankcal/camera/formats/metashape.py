@@ -95,11 +95,6 @@ def convert_from_metashape(camera, pixel_mm):
 def convert_to_metashape(camera):
     """Convert a FramedCamera, exactly in its plain form without affinity, else by a fit.
 
-    Parameters
-    ----------
-    camera : FramedCamera
-        The camera.
-
     Returns
     -------
     Metashape

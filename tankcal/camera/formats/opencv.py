@@ -121,11 +121,6 @@ def convert_from_opencv(camera, pixel_mm, size_px):
 def convert_to_opencv(camera):
     """Convert a FramedCamera, exactly in its plain form, else by a fit over the frame.
 
-    Parameters
-    ----------
-    camera : FramedCamera
-        The camera.
-
     Returns
     -------
     OpenCV

@@ -88,11 +88,6 @@ def convert_from_pix4d(camera, size_px):
 def convert_to_pix4d(camera):
     """Convert a FramedCamera, exactly in its plain form with square pixels, else by a fit.
 
-    Parameters
-    ----------
-    camera : FramedCamera
-        The camera.
-
     Returns
     -------
     Pix4D

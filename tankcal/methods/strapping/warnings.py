@@ -206,12 +206,6 @@ def _check_pairs(job, straps):
 def straps_apart(names, straps):
     """Yield straps that differ from the other straps of their course or ring.
 
-    Parameters
-    ----------
-    names : list of str
-        Names of the courses or rings.
-    straps : Straps
-
     Yields
     ------
     (float, Reduced, int, float)

@@ -339,12 +339,6 @@ def check_rejected_bases(measurements, readings):
 
     A survey has few bases and many distances. The distances therefore prevail, whichever scale is
     wrong.
-
-    Parameters
-    ----------
-    measurements : Measurements
-    readings : Readings
-        Readings of the adjustment.
     """
     bars = {instrument.name for instrument in measurements.instruments if instrument.kind == KIND}
     bases = {

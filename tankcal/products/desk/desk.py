@@ -353,11 +353,6 @@ class Desk:
     def prepare_run(self, on_progress=None, papers=True, on_result=None):
         """Save the job, and return a `Run` that is not yet started.
 
-        Parameters
-        ----------
-        on_progress, papers, on_result
-            As in `Run`.
-
         Raises
         ------
         Refusal

@@ -91,11 +91,6 @@ class FormField:
 def form_of(desk):
     """Build the form of the settings of a job.
 
-    Parameters
-    ----------
-    desk : Desk
-        Desk of the job.
-
     Returns
     -------
     list of FormField

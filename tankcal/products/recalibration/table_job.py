@@ -48,11 +48,6 @@ class RecordedRadii:
 def read_recorded(former):
     """Return the radii in the record of a former table.
 
-    Parameters
-    ----------
-    former : FormerTable
-        Table with its record.
-
     Returns
     -------
     RecordedRadii

@@ -167,11 +167,6 @@ def shorten(name, longest=LONGEST_NAME):
 def number_names(names):
     """Labels of rows and headings of columns for a matrix of names.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Names.
-
     Returns
     -------
     labels, heads : list of str

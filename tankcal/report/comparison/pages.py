@@ -36,20 +36,7 @@ MOST_ROWS_OF_PAGE = 5000  # a page shows a selection of more rows; workbook and 
 
 
 def pages(paper, folder=None, whole=False):
-    """Return the blocks of a ComparisonPaper.
-
-    Parameters
-    ----------
-    paper : ComparisonPaper
-    folder : Path, optional
-        Folder of the files that the PDF embeds; None: no files.
-    whole : bool, optional
-        Whether every row is shown, as on the web page.
-
-    Returns
-    -------
-    list of Block
-    """
+    """Return the blocks of a ComparisonPaper, as `SavedDocument.renderers` describes."""
     return [
         *paper.head(folder),
         *verdict(paper),

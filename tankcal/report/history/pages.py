@@ -56,20 +56,7 @@ SHEETS = {
 
 
 def pages(paper, folder=None, whole=False):
-    """Return the blocks of a HistoryPaper.
-
-    Parameters
-    ----------
-    paper : HistoryPaper
-    folder : Path, optional
-        Folder of the files that the PDF embeds; None: no files.
-    whole : bool, optional
-        Whether every row is shown, as on the web page.
-
-    Returns
-    -------
-    list of Block
-    """
+    """Return the blocks of a HistoryPaper, as `SavedDocument.renderers` describes."""
     return [
         *paper.head(folder),
         blocks.result(paper.word("labels.history"), _span(paper), _summary(paper)),

@@ -83,25 +83,9 @@ class Ethanol:
     name = message("correction_r22", "OIML R 22:1975, ethanol and water, base 20 °C")
 
     def factor(self, density, temperature_c, pressure_kpa=0.0):
-        """Volume correction factor rho(p, t) / rho(p, 20 degC) of a density at 20 degC.
+        """Volume correction factor rho(p, t) / rho(p, 20 degC), as `Petroleum.factor`.
 
-        Parameters
-        ----------
-        density : float or ndarray
-            Density at 20 degC, kg/m3, which determines the mass fraction p.
-        temperature_c : float or ndarray
-            Temperature of the liquid, degC.
-        pressure_kpa : float, optional
-            Gauge pressure; only 0.
-
-        Returns
-        -------
-        float or ndarray
-
-        Raises
-        ------
-        InputError
-            For a value outside the range of the equation.
+        The density at 20 degC determines the mass fraction p; the pressure must be 0.
         """
         self._refuse_outside(temperature_c, pressure_kpa)
         fraction = self.mass_fraction(density, BASE_C)

@@ -74,20 +74,7 @@ class Brazil:
         return message("correction_cnp_unrounded", "Resolução CNP 6/70, unrounded, base 20 °C")
 
     def factor(self, density, temperature_c, pressure_kpa=0.0):
-        """Volume correction factor to 20 degC.
-
-        Parameters
-        ----------
-        density : float or ndarray
-            Density at 20 degC, kg/m3.
-        temperature_c : float or ndarray
-            Temperature of the liquid, degC.
-        pressure_kpa : float, optional
-            Gauge pressure; only 0.
-
-        Returns
-        -------
-        float or ndarray
+        """Volume correction factor to 20 degC, as `Petroleum.factor`; the pressure must be 0.
 
         Raises
         ------

@@ -75,20 +75,9 @@ class LiquefiedGas:
     name = message("correction_tp27", "GPA TP-27, liquefied petroleum gas, base 60 °F")
 
     def factor(self, density, temperature_c, pressure_kpa=0.0):
-        """Volume correction factor of the saturated liquid.
+        """Volume correction factor of the saturated liquid, as `Petroleum.factor`.
 
-        Parameters
-        ----------
-        density : float or ndarray
-            Density at 60 degF, kg/m3.
-        temperature_c : float or ndarray
-            Temperature of the liquid, degC.
-        pressure_kpa : float, optional
-            Gauge pressure above that of saturation; only 0.
-
-        Returns
-        -------
-        float or ndarray
+        The density is that at 60 degF; the gauge pressure above that of saturation must be 0.
 
         Raises
         ------
