@@ -307,15 +307,19 @@ def _read_table(arrays, place, rows):
         column = arrays[f"{place}.{name}"]
         if f"{place}.{name}{_TEXTS}" in arrays:
             texts = json.loads(arrays[f"{place}.{name}{_TEXTS}"].tobytes())
-            # Codes of texts must be -1 (no text) or the number of a text.
-            is_valid = column.dtype.kind == "i" and all(type(text) is str for text in texts)
-            if not is_valid or column.max(initial=-1) >= len(texts) or column.min(initial=0) < -1:
-                raise ValueError("texts")
-            column = Texts(column, tuple(texts))
+            column = _make_texts(column, texts)
         if len(column) != rows or not _matches(column, schema):
             raise ValueError(f"{place}.{name}")
         columns[name] = column
     return columns
+
+
+def _make_texts(codes, texts):
+    """Return `Texts`; ValueError for invalid codes or texts."""
+    is_valid = codes.dtype.kind == "i" and all(type(text) is str for text in texts)
+    if not is_valid or codes.max(initial=-1) >= len(texts) or codes.min(initial=0) < -1:
+        raise ValueError("texts")
+    return Texts(codes, tuple(texts))
 
 
 _KINDS = {"number": "fi", "integer": "i", "boolean": "b"}  # kinds of numpy for a type of JSON
