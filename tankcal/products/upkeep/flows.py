@@ -8,6 +8,7 @@ import pandas as pd
 from tankcal.messages import message
 from tankcal.products.upkeep.clocks import NOT_A_TIME
 
+TOTAL_M3 = 1e-4  # largest difference of a rise of a counter from its transaction
 ROLLOVER = 0.01  # a total that falls from above 99 % to below 1 % of a power of ten rolled over
 SECOND_NS = 10**9
 
@@ -123,6 +124,11 @@ def _join(name, parts, adjusted):
 def _sum_totals(name, rows, file, adjusted):
     """`MeterFlow` of running totals: rollovers are added, other falls break the flow."""
     time, total = rows["time"].to_numpy(), rows["total"].to_numpy()
+    if "volume" in rows:
+        # A removed transaction: the counter rises by more than the volume of its row.
+        volumes = rows["volume"].to_numpy()[1:]
+        differs = np.abs(np.diff(total) - volumes) > np.maximum(1e-3 * volumes, TOTAL_M3)
+        file.findings.add("meters", "total_unlike_sum", time[1:][differs & (np.diff(total) >= 0)])
     volume = np.diff(total)
     # Powers of ten apply to the unit of the counter, such as 999 999.9 L.
     unit = file.profile.to_si("total", 1.0)

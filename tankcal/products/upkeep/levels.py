@@ -150,6 +150,8 @@ class LevelSums:
                     state.save(key, span)
                     state.save(self._key(state, key, span), sums)
             self._add_file(sums, file.findings)
+            if "row" in sums.names:  # as if the file had been read
+                file.span[:] = sums.counts[sums.names.index("row")].tolist()
 
     def _key(self, state, key, span):
         """Key of the sums of a file: windows, flows and table during the file."""

@@ -22,7 +22,8 @@ from tankcal.products.upkeep.profiles import KINDS, QUANTITIES, LogProfile
 
 CHUNK = 200_000  # rows
 MOST_BAD_ROWS = 3  # rows named in messages of a file
-MOST_CAPTURE_BYTES = 200_000_000
+MOST_CAPTURE_BYTES = 200_000_000  # read as a whole
+MOST_LOG_BYTES = 4_000_000_000  # of a CSV file, read in chunks
 HEAD_BYTES = 65_536  # by which the layout of a file is found
 COMMA_NUMBER = re.compile(r"(?:^|[;\t|\"])\s*-?\d+,\d+\s*(?:$|[;\t|\"])")
 TIMES = ("time", "begin", "end")
@@ -49,18 +50,22 @@ class Findings:
         count = len(times) if count is None else count
         if not count:
             return
-        entry = self.counts[log, kind]
-        entry[0] += int(count)
-        known = np.asarray(times, dtype=np.int64)
-        known = known[known != NOT_A_TIME]
-        if len(known):
-            low, high = int(known.min()), int(known.max())
-            entry[1] = low if entry[1] is None else min(entry[1], low)
-            entry[2] = high if entry[2] is None else max(entry[2], high)
+        add_span(self.counts[log, kind], times, count)
 
     def number(self, log, kind):
         """Number of rows of a kind."""
         return self.counts[log, kind][0] if (log, kind) in self.counts else 0
+
+
+def add_span(entry, times, count=None):
+    """Add rows to [number, first time, last time], with their times (n,)."""
+    known = np.asarray(times, dtype=np.int64)
+    known = known[known != NOT_A_TIME]
+    entry[0] += int(len(known) if count is None else count)
+    if len(known):
+        low, high = int(known.min()), int(known.max())
+        entry[1] = low if entry[1] is None else min(entry[1], low)
+        entry[2] = high if entry[2] is None else max(entry[2], high)
 
 
 @dataclass(frozen=True)
@@ -102,6 +107,8 @@ class LogFile:
         Receives problems.
     digest : str
         SHA-256.
+    span : list
+        Number of rows with a time, and their first and last time: [int, ns or None, ns or None].
     """
 
     path: object
@@ -111,6 +118,7 @@ class LogFile:
     findings: Findings
     log: Log
     digest: str = ""
+    span: list = field(default_factory=lambda: [0, None, None])
 
     def chunks(self):
         """Yield chunks {column: values (n,)}; "row" is the row in the file.
@@ -126,6 +134,8 @@ class LogFile:
 
     def _csv(self):
         """Yield chunks of texts of a CSV file: a data frame with the columns of the profile."""
+        if self._is_too_large(MOST_LOG_BYTES):
+            return
         options, columns = self.profile.file, self.profile.columns
         layout = self._find_layout()
         present = list(options["headings"]) if options.get("headings") else layout.headings
@@ -154,6 +164,22 @@ class LogFile:
             frame = frame[frame["time"].str.strip() != columns["time"]]
             yield row, self._numbers(frame, layout.decimal)
             row += len(chunk)
+
+    def has_column(self, column):
+        """Whether a CSV file has a column of the profile."""
+        heading = self.profile.columns.get(column)
+        if heading is None:
+            return False
+        return heading in (self.profile.file.get("headings") or self._find_layout().headings)
+
+    def _is_too_large(self, most):
+        """Whether the file has more bytes than allowed, which is then reported."""
+        size = self.path.stat().st_size
+        if size > most:
+            self.log.problem(self.path.name, message(
+                "upkeep_capture_too_large", "{size:.0f} MB; expected at most {most:.0f} MB",
+                size=size / 1e6, most=most / 1e6))  # fmt: skip
+        return size > most
 
     def _find_layout(self):
         """`Layout` of the file: as declared in the profile, or by its first rows."""
@@ -206,13 +232,9 @@ class LogFile:
 
     def _captures(self):
         """Yield the blocks of a TLS capture as a chunk; a wrong check sum leaves a block out."""
-        data = self.path.read_bytes()
-        if len(data) > MOST_CAPTURE_BYTES:
-            text = message("upkeep_capture_too_large", "{size:.0f} MB; expected at most "
-                           "{most:.0f} MB", size=len(data) / 1e6,
-                           most=MOST_CAPTURE_BYTES / 1e6)  # fmt: skip
-            self.log.problem(self.path.name, text)
+        if self._is_too_large(MOST_CAPTURE_BYTES):
             return
+        data = self.path.read_bytes()
         is_inventory = self.profile.format == "tls-inventory"
         rows, blocks = [], 0
         for block in TLS_BLOCK.finditer(data):
@@ -298,6 +320,7 @@ class LogFile:
         self.findings.add(
             self.kind, "no_time", count=int((is_unread & (local == NOT_A_TIME)).sum())
         )
+        add_span(self.span, times["time"][~is_unread])
         yield {key: values[~is_unread] for key, values in (chunk | times).items()}
 
     def _parse_times(self, texts):

@@ -303,7 +303,11 @@ def _remarks(paper):
     upkeep = paper.record
     texts = [paper.warning(warning) for warning in upkeep["warnings"]]
     texts += paper.words["standing"].values()
-    files = ", ".join(f"{item['file']} {item['sha256'][:DIGEST]}" for item in upkeep["files"])
+    files = ", ".join(
+        f"{item['file']} {item['sha256'][:DIGEST]}"
+        + (f" ({item['rows']}: {item['first']} – {item['last']})" if item["rows"] else "")
+        for item in upkeep["files"]
+    )
     texts.append(paper.word("texts.inputs", files=bearable(files)))
     return texts
 

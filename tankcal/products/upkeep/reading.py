@@ -25,6 +25,7 @@ from tankcal.products.upkeep.causes import PRIORS, Meter, Operation, TableStock
 from tankcal.products.upkeep.flows import quiet_windows, read_flows
 from tankcal.products.upkeep.levels import MOST_OFFSET_S, LevelSums
 from tankcal.products.upkeep.logs import Findings, LogFile
+from tankcal.products.upkeep.own_table import compare_own_volumes
 from tankcal.products.upkeep.profiles import read_log_profile
 from tankcal.products.upkeep.start import (
     DRAWING,
@@ -107,11 +108,14 @@ METER_COLUMNS = (
 
 @dataclass(frozen=True)
 class LogSource:
-    """File of a log: kind, name, SHA-256, number of rows, first and last time."""
+    """File of a log: kind, name, SHA-256, number of rows, first and last time in ns UTC."""
 
     kind: str
     file: str
     sha256: str
+    rows: int | None = None
+    first_ns: int | None = None
+    last_ns: int | None = None
 
 
 @dataclass(frozen=True)
@@ -384,6 +388,8 @@ def _build(sections, stock, meters, files, findings, sources, log, state):
     windows = quiet_windows(flows, rules["settle_s"], first, last)
     sums = LevelSums(windows, quantum, flows, table.volume)
     sums.read(files["levels"], state)
+    for file in files["levels"]:
+        compare_own_volumes(file, table, findings, events, log)
     log.stop_if_problems()
     pieces = sums.means(findings)
     inside = ~table.is_outside(pieces.level_m)
@@ -419,6 +425,10 @@ def _build(sections, stock, meters, files, findings, sources, log, state):
             log.warning(METERS, message("upkeep_meter_unlisted", "meter {name} of the log is not "
                         "listed; its factor is taken as 1 with the prior u",
                         name=flow.name))  # fmt: skip
+    spans = {file.digest: file.span for kind in files.values() for file in kind}
+    sources = [replace(source, **dict(zip(("rows", "first_ns", "last_ns"),
+                                          spans.get(source.sha256, ()), strict=False)))
+               for source in sources]  # fmt: skip
     return Inputs(sections, operation, steps, findings, tuple(sources), len(pieces), traceable,
                   tuple(log.warnings), clock=clock)  # fmt: skip
 

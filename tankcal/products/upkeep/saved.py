@@ -168,6 +168,9 @@ class UpkeepSource(Saved):
     kind: str = key("settings, record, levels ...")
     file: str = key("name")
     sha256: str = key("of its bytes")
+    rows: int | None = key("rows with a time; null: no log")
+    first: str | None = key("first time, UTC, to the hour")
+    last: str | None = key("last time, UTC, to the hour")
     chain: str = key("SHA-256 of the chain before and of this file")
 
 

@@ -339,11 +339,12 @@ def _fit_months(rows, columns):
 
 def _count(log, kind, entry):
     """`UpkeepCount` of a finding; times to the hour, so that no single sale shows."""
-    texts = [
-        None if time is None else str(np.datetime64(time, "ns").astype("datetime64[h]"))
-        for time in entry[1:]
-    ]
-    return saved.UpkeepCount(log, kind, entry[0], *texts)
+    return saved.UpkeepCount(log, kind, entry[0], *map(_hour, entry[1:]))
+
+
+def _hour(time_ns):
+    """Text of a time to the hour; None without a time."""
+    return None if time_ns is None else str(np.datetime64(time_ns, "ns").astype("datetime64[h]"))
 
 
 def _chain(sources):
@@ -351,5 +352,7 @@ def _chain(sources):
     chain, files = "", []
     for source in sources:
         chain = hashlib.sha256(f"{chain}{source.sha256}".encode()).hexdigest()
-        files.append(saved.UpkeepSource(source.kind, source.file, source.sha256, chain))
+        files.append(saved.UpkeepSource(
+            source.kind, source.file, source.sha256, source.rows, _hour(source.first_ns),
+            _hour(source.last_ns), chain))  # fmt: skip
     return files
