@@ -10,9 +10,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import EXAMPLE
+from drawn_stations import (
+    CONTEST,
+    DRAWING,
+    POSE,
+    draw_tank,
+    drawn_stock,
+    posed_station,
+    posed_volume,
+)
+from draws import draws
 from example_logs import Station, TrueTank, make_station, make_upright, write_station
 from numpy.testing import assert_allclose
-from station_years import draw_year, make_table
+from station_years import draw_from_model, draw_year, make_table
 
 from tankcal import cli
 from tankcal.products.quantity.table import TankTable, read_table
@@ -128,9 +138,6 @@ def test_tables_deliveries_and_meters_hold(table):
     assert min(share.values()) > 0.88
 
 
-DRAWING = {"radius": 0.0125, "length": 0.12, "end": 0.06, "tilt": 0.015, "zero": 0.01}
-
-
 @pytest.mark.study
 def test_deliveries_of_stations_from_drawings_hold():
     """20 stations of a year with the table of a drawing: all deliveries within 95 % intervals.
@@ -151,6 +158,67 @@ def test_deliveries_of_stations_from_drawings_hold():
           np.sqrt(np.mean(np.square(ratios))))  # fmt: skip
     assert np.mean(np.abs(ratios) < 1.96) >= 0.9
     assert abs(np.mean(ratios)) < 0.5
+
+
+@pytest.mark.study
+def test_contents_of_other_tanks_hold():
+    """Stations from drawings with other ends, rings of 3 mm and a flatter section.
+
+    With the table linear in the sizes, and with the sizes, section and ends as causes at their
+    estimates. docs/studies/upkeep.md has 110 stations.
+    """
+    heights, stock = np.array([0.5, 0.8, 1.1, 1.4, 1.8]), drawn_stock()
+    table, ratios = make_table(DRAWING), {"table": [], "sizes": []}
+    for seed in range(draws(20, 110)):
+        rng = np.random.default_rng(40000 + seed)
+        year = draw_year(rng, table, days=180, sizes=DRAWING, tank=draw_tank(rng))
+        for name, now in (("table", year.operation.stock), ("sizes", stock)):
+            estimation = estimate(replace(year.operation, stock=now), year.steps)
+            count = len(now.names)
+            x = estimation.triangle.estimate[:count]
+            columns = now.columns(heights, x)
+            u = np.sqrt(np.einsum("ij,jk,ik->i", columns, estimation.covariance[:count, :count],
+                                  columns))  # fmt: skip
+            ratios[name].append((now.volume_m3(heights, x) - year.tank.below(heights)) / u)
+        stock.known.clear()
+    for name, values in ratios.items():
+        print("contents of other tanks by", name, np.mean(np.abs(values) < 1.96), np.mean(values))
+        assert np.mean(np.abs(values) < 1.96) >= 0.8  # levels of a station share their error
+        assert abs(np.mean(values)) < 1.0
+
+
+# ---- twin of a contest
+
+
+def test_capacity_of_the_contest_tank():
+    """Public solutions of CUMCM 2010 A state 64.664 m3."""
+    assert posed_volume(CONTEST, np.array([3.0]))[0] == pytest.approx(64.664, abs=1e-3)
+
+
+@pytest.mark.slow
+def test_pose_and_refill_of_the_twin():
+    """Sales of a tank with the published pose: pitch 2.12, roll 4.24 degrees, before one refill.
+
+    The data of the contest are no text in public repositories, so a twin is simulated. The pose and
+    the refill, which is predicted blindly, are within 3 u, and their errors over u near 1.
+    """
+    ratios, pitch, roll = [], np.radians(2.12), np.radians(4.24)
+    for seed in range(20):
+        operation, steps, tank, factor = posed_station(np.random.default_rng(seed), pitch, roll)
+        estimation = estimate(operation, steps, is_robust=False)
+        x, covariance = estimation.triangle.estimate, estimation.covariance
+        true = [pitch / POSE["pitch"], (1 - np.cos(roll)) / POSE["lowering"], (factor - 1) / 1e-3]
+        ends = np.array([steps.marks.level_m[-1], 2.5])
+        refill = np.diff(operation.stock.columns(ends, x[:2]), axis=0)[0]
+        error = np.diff(operation.stock.volume_m3(ends, x[:2]) - tank(ends))[0]
+        u = np.append(np.sqrt(np.diag(covariance)), np.sqrt(refill @ covariance[:2, :2] @ refill))
+        ratios.append(np.append(x - true, error) / u)
+        assert u[-1] < 0.01  # m3, of 45 m3
+    ratios = np.array(ratios)
+    print("twin, rms error over u of pitch, roll, meter, refill:",
+          np.sqrt(np.mean(ratios**2, axis=0)))  # fmt: skip
+    assert np.all(np.abs(ratios) < 3)
+    assert np.all(np.sqrt(np.mean(ratios**2, axis=0)) < 1.5)
 
 
 # ---- planted faults
@@ -214,17 +282,27 @@ def test_years_without_a_fault_have_no_alarm(table, seed):
 
 
 @pytest.mark.study
-def test_false_alarms_of_fifty_years(table):
-    """50 years without a fault by a generator that is not the model, at a promised rate of 5 %.
+@pytest.mark.parametrize("by", ["model", "generator"])
+def test_false_alarms(table, by):
+    """Years without a fault, promised 5 %: 3 to 7 % by the model, under 10 % by the generator.
 
-    A limit by the model alone gave 9 alarms in 16 years. docs/studies/upkeep.md has 228 years.
+    A limit by the model alone gave 9 alarms in 16 years of a generator that is not the model.
     """
-    alarms = 0
-    for seed in range(50):
-        year = draw_year(np.random.default_rng(5000 + seed), table, days=365)
-        alarms += watch(estimate(year.operation, year.steps)).alarm_s is not None
-    print("alarms in 50 years without a fault:", alarms)
-    assert alarms <= 7
+    years, alarms = draws(50, 1000), 0
+    base = draw_year(np.random.default_rng(5000), table, days=364)
+    base = estimate(base.operation, base.steps, is_robust=False)
+    for seed in range(years):
+        if by == "model":
+            estimation = draw_from_model(np.random.default_rng(70000 + seed), base)
+        else:
+            year = draw_year(np.random.default_rng(5000 + seed), table, days=364)
+            estimation = estimate(year.operation, year.steps)
+        alarms += watch(estimation).alarm_s is not None
+    print("alarms in years without a fault, by", by, alarms, years)
+    low, high = (0.03, 0.07) if by == "model" else (0.0, 0.10)
+    # 50 years: beyond the 1 and 99 % quantiles of a rate within these bounds.
+    margin = 0 if years >= 1000 else 4
+    assert low * years - margin <= alarms <= high * years + margin
 
 
 @pytest.mark.parametrize("late_s", [0, 600, -300, 3600])

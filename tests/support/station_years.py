@@ -4,13 +4,14 @@ The tank has rings of alternating radius, the deviation of the gauge a wave of 0
 and wear, layers follow each delivery, lines warm with the air of the hour, losses have a sign.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from example_logs import TrueTank
 
 from tankcal.products.quantity.table import TankTable
 from tankcal.products.upkeep.causes import PRIORS, YEAR_S, Meter, Operation, TableStock
+from tankcal.products.upkeep.filtering import total_innovations, whiten_steps
 from tankcal.products.upkeep.steps import Marks, Steps
 
 EXPANSION, BASE_C = 0.00124, 15.0
@@ -50,12 +51,17 @@ class Year:
     operation: Operation
 
 
-def draw_year(rng, table, *, days=365, sizes=SURVEY, marks=6, faults=None):
-    """`Year` of a station whose tank has drawn sizes; faults {kind: (day, size)}."""
+def draw_year(rng, table, *, days=365, sizes=SURVEY, marks=6, faults=None, tank=None,
+              order_m3=(7.0, 7.0), load_m3=12.0):  # fmt: skip
+    """`Year` of a station whose tank has drawn sizes, or of `tank`; faults {kind: (day, size)}.
+
+    A delivery of about `load_m3` is ordered at a stock between the limits `order_m3`.
+    """
     faults = faults or {}
     prior = PRIORS["station"]
-    true = {name: getattr(NOMINAL, name) + u * rng.normal() for name, u in sizes.items()}
-    tank = TrueTank(**true, ring=0.001 * rng.uniform(-1, 1))
+    if tank is None:
+        true = {name: getattr(NOMINAL, name) + u * rng.normal() for name, u in sizes.items()}
+        tank = TrueTank(**true, ring=0.001 * rng.uniform(-1, 1))
     count = marks * days + 1
     # Marks between six and midnight, and a rest at night.
     hours = np.append(np.linspace(0.5, 5.5, 2), np.linspace(8, 22, marks - 2))
@@ -86,13 +92,14 @@ def draw_year(rng, table, *, days=365, sizes=SURVEY, marks=6, faults=None):
         leak += size * np.clip((day[1:] - begin) / np.diff(day), 0, 1)
     gone = gone + leak * seconds / 3.6e6
     bias = 0.0015 * rng.normal()
-    stock, stocks, layer = 14.0, [14.0], 0.0
+    stock, stocks, layer, order = 14.0, [14.0], 0.0, order_m3[1]
     ticket, delivered_c, number, layers = (np.zeros(len(sold)) for _ in range(4))
     for k in range(len(sold)):
         layer *= np.exp(-seconds[k] / 43200)
         stock -= gone[k]
-        if stock < 7.0 and seconds[k] < 4 * 3600:
-            volume, warm = 12.0 + rng.choice([-1, 0, 1]), mean(ground)[k] + 3 * rng.normal()
+        if stock < order and seconds[k] < 4 * 3600:
+            order = order_m3[0] + (np.ptp(order_m3) and np.ptp(order_m3) * rng.random())
+            volume, warm = load_m3 + rng.choice([-1, 0, 1]), mean(ground)[k] + 3 * rng.normal()
             now = bias
             if "ticket" in faults and day[k] >= faults["ticket"][0]:
                 now += faults["ticket"][1]
@@ -130,3 +137,31 @@ def draw_year(rng, table, *, days=365, sizes=SURVEY, marks=6, faults=None):
         (ns.astype(float), air), start_ns=0,
     )  # fmt: skip
     return Year(steps, tank, factor, operation)
+
+
+def draw_from_model(rng, estimation):
+    """`Estimation` with misclosures drawn by the model: constant causes, and those that drift.
+
+    Levels, wander, layers and meter factors are simulated forwards in time, not by the filter.
+    """
+    balance = estimation.balance
+    drift, steps = balance.drift, len(balance.drift)
+    stay, decay = np.exp(-drift.seconds / drift.wander_s), np.exp(-drift.seconds / drift.layer_s)
+    normal = rng.normal(size=(2, steps + 1))
+    wander, layer = drift.wander_sd_m * normal[0], np.zeros(steps + 1)
+    for k in range(steps):
+        wander[k + 1] = stay[k] * wander[k] + np.sqrt(1 - stay[k] ** 2) * wander[k + 1]
+        layer[k + 1] = decay[k] * layer[k] + drift.layer_sd_k[k] * normal[1, k]
+    level = wander + drift.level_sd_m * rng.normal(size=steps + 1)
+    walk = np.sqrt(drift.seconds[:, None] * drift.walk_per_s)
+    factor = np.cumsum(walk * rng.normal(size=walk.shape), axis=0)
+    misclosure = balance.columns_m3 @ rng.normal(size=balance.columns_m3.shape[1])
+    misclosure += np.diff(drift.by_degree_m3 * layer - drift.area_m2 * level)
+    misclosure += np.sum(drift.metered_m3 * factor, axis=1)
+    misclosure += drift.noise_m3 * rng.normal(size=steps)
+    is_used = np.ones(steps, dtype=bool)
+    drift = replace(drift, is_used=is_used)
+    balance = replace(balance, misclosure_m3=misclosure, drift=drift)
+    rows = whiten_steps(drift, np.column_stack([misclosure, balance.columns_m3])).rows
+    return replace(estimation, balance=balance, rows=rows,
+                   innovations=total_innovations(rows, is_used)[:, 0])  # fmt: skip
