@@ -197,7 +197,7 @@ def test_capacity_of_the_contest_tank():
 
 @pytest.mark.slow
 def test_pose_and_refill_of_the_twin():
-    """Sales of a tank with the published pose: pitch 2.12, roll 4.24 degrees, before one refill.
+    """Sales of a tank with the published pose: pitch 2.12, roll 4.24 degrees, before a refill.
 
     The data of the contest are no text in public repositories, so a twin is simulated. The pose and
     the refill, which is predicted blindly, are within 3 u, and their errors over u near 1.
