@@ -49,11 +49,13 @@ def summary_files(summary, language, folder):
     from tankcal.report.web import page
 
     text = json.dumps(summary, ensure_ascii=False, allow_nan=False, indent=1)
-    data = text.encode("utf-8", "replace")  # names of files may contain bytes that are not UTF-8
+    data = text.encode("utf-8", "replace")
     (folder / JSON).write_bytes(data + b"\n")
-    paper = SummaryPaper(json.loads(data), language)
-    rows = [paper.plain_row(row) for row in paper.summary["rows"]]
-    write_table(CSV_COLUMNS, folder / CSV, rows)
+    # Names of files may contain bytes that are not UTF-8; all other summaries need no copy.
+    is_utf8 = data == text.encode("utf-8", "surrogatepass")
+    paper = SummaryPaper(summary if is_utf8 else json.loads(data), language)
+    del text, data
+    write_table(CSV_COLUMNS, folder / CSV, [paper.plain_row(row) for row in paper.summary["rows"]])
     write_summary(paper, folder / WORKBOOK)
     web_page = page([block.data for block in page_blocks(paper)])
     (folder / PAGE).write_text(web_page, encoding="utf-8", errors="replace")

@@ -60,6 +60,7 @@ VERDICTS = (
     *("global_test", "rule_verdict", "comparison_verdict", "inspection_verdict"),
     "alarm_verdict",
 )
+COMPARED = ("status", *VERDICTS, "height_m", "volume_m3", "U_m3")  # with the last batch
 PAPERS = (  # in order of priority: the summary links to the first
     *("certificate.pdf", "report.pdf", "comparison.pdf", "inspection.pdf", "upkeep.pdf"),
     "capacity.xlsx",
@@ -350,10 +351,12 @@ def write_summary(out, jobs, language):
 
 
 def _former_rows(path):
-    """Return {name: row} of the last summary; None if it is missing or invalid."""
+    """Return {name: values COMPARED} of the last summary; None if it is missing or invalid."""
     try:
         rows = json.loads(path.read_bytes())["rows"]
-        return {row["name"]: row for row in rows} if all(map(is_summary_row, rows)) else None
+        if not all(map(is_summary_row, rows)):
+            return None
+        return {row["name"]: {key: row.get(key) for key in COMPARED} for row in rows}
     except (OSError, ValueError, LookupError, TypeError, RecursionError):
         return None
 
