@@ -31,7 +31,12 @@ def add(commands):
         epilog="exit status: 0 done; 2 the plan must be corrected; 3 the survey would have no "
         "valid solution.",
     )
-    plan.add_argument("plan", metavar="PLAN", help="a plan's folder, or its plan.toml")
+    plan.add_argument(
+        "plan",
+        metavar="PLAN",
+        help="a plan's folder, or its plan.toml; a folder "
+        "with upkeep.toml: the benefit of further data",
+    )
     plan.add_argument(
         "--out",
         metavar="DIR",
@@ -82,6 +87,9 @@ def add(commands):
 
 def _plan(options):
     prepare_for_small_work()
+    if (Path(options.plan) / "upkeep.toml").is_file():
+        _plan_upkeep(options)
+        return
     from tankcal.planning import load_plan, predict
     from tankcal.planning.improvements import smallest, what_helps
     from tankcal.planning.wall.model import WallPlan
@@ -130,6 +138,28 @@ def _plan(options):
         say(line)
     if written:
         print_paths(Path(options.out), written)
+
+
+def _plan_upkeep(options):
+    """Print the benefit of further everyday data, for a tank kept up."""
+    from tankcal.products.upkeep.planning import plan_folder
+
+    speak(options.language)
+    (low, high), gains, k = plan_folder(options.plan)
+    words = {
+        "now": message("upkeep_plan_now", "the steps so far"),
+        "month": message("upkeep_plan_month", "with a further month like the last 30 days"),
+        "prover": message("upkeep_plan_prover", "with all meters proved to u = 0.03 %"),
+        "low_stock": message("upkeep_plan_low", "with the stock run down to half of this level"),
+    }
+    for gain in gains:
+        say(message(
+            "upkeep_plan_line", "{what}: delivery from {low} to {high} m, U = {delivery} L; "
+            "content at {low} m, U = {content} L", what=words[gain.name],
+            low=fixed(low, 3, marks()), high=fixed(high, 3, marks()),
+            delivery=format_significant(1000 * k * gain.u_delivery_m3, 2, marks()),
+            content=format_significant(1000 * k * gain.u_content_m3, 2, marks()),
+        ))  # fmt: skip
 
 
 def _refuse_idle(options):

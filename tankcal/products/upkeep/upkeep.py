@@ -50,15 +50,8 @@ def keep_up(inputs, state=NO_STATE):
     -------
     saved.UpkeepFile
     """
-    sections, operation = inputs.sections, inputs.operation_of_meters()
-    warnings = list(inputs.warnings)
-    probability, solutions = sections["upkeep"]["coverage_probability"] or 0.95, []
-    is_free = inputs.start == SALES
-    if is_free:
-        operation, estimation, solutions = estimate_sizes(operation, inputs.steps, state)
-        probability = sections["upkeep"]["coverage_probability"] or STOCK_PROBABILITY
-    else:
-        estimation = estimate(operation, inputs.steps, state=state)
+    sections, warnings, is_free = inputs.sections, list(inputs.warnings), inputs.start == SALES
+    operation, estimation, solutions, probability = estimate_inputs(inputs, state)
     k = float(coverage_factor(probability, np.inf))
     ratio = estimation.triangle.chi2 / max(estimation.triangle.count, 1)
     scale = float(np.sqrt(max(ratio, 1.0)))
@@ -158,6 +151,25 @@ def keep_up(inputs, state=NO_STATE):
         files=_chain(inputs.sources),
         warnings=warnings_of(warnings),
     )  # fmt: skip
+
+
+def estimate_inputs(inputs, state=NO_STATE):
+    """Estimate a tank from its inputs.
+
+    Returns
+    -------
+    operation : causes.Operation
+    estimation : estimation.Estimation
+    solutions : list of saved.UpkeepSolution
+    probability : float
+        Coverage probability of all U.
+    """
+    operation, declared = inputs.operation_of_meters(), inputs.sections["upkeep"]
+    probability = declared["coverage_probability"]
+    if inputs.start == SALES:
+        solved = estimate_sizes(operation, inputs.steps, state)
+        return *solved, probability or STOCK_PROBABILITY
+    return operation, estimate(operation, inputs.steps, state=state), [], probability or 0.95
 
 
 def update_table(estimation, stock, low_m, high_m):
