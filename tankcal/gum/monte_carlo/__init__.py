@@ -366,8 +366,9 @@ def estimates_of(values, coordinates, control, probability):
         Standard errors of a single plain draw.
     """
     estimates, plain = np.empty((6, values.shape[1])), np.empty((3, values.shape[1]))
-    for row in range(values.shape[1]):
-        column, control_sample = values[:, row], None
+    # Each row of the model is read many times: its draws lie together in memory.
+    for row, column in enumerate(np.ascontiguousarray(values.T)):
+        control_sample = None
         if control is not None and control.known[row]:
             linear = coordinates @ control.coefficients[row]
             control_sample = (linear, control.quantile[row], control.u[row])
@@ -380,11 +381,11 @@ def _row_estimates(values, control_sample, probability):
     mean, deviation = np.mean(values), np.std(values)
     lower = np.linspace(0, 1 - probability, LEVELS)
     levels = np.stack([lower, lower + probability])
+    ordered = np.sort(values)
     if control_sample is not None:
         linear, _, u = control_sample
         mean, deviation = _moments(values, linear, u, mean, deviation)
-        levels = _correct_levels(values, control_sample, levels, probability)
-    ordered = np.sort(values)
+        levels = _correct_levels(values, ordered, control_sample, levels, probability)
     count = len(ordered)
     # Plotting positions (i - 1/3)/(n + 1/3) of the ordered draws.
     probabilities = (np.arange(1, count + 1) - 1 / 3) / (count + 1 / 3)
@@ -434,11 +435,12 @@ def _moments(values, linear, u, mean, deviation):
     return mean, np.sqrt(max(variance, 0.0))
 
 
-def _correct_levels(values, control_sample, levels, probability):
+def _correct_levels(values, ordered, control_sample, levels, probability):
     """Levels, shifted by the error of the draws at the quantiles of the linear part."""
     linear, quantiles, _ = control_sample
     nodes = nodes_of(probability)
-    ordered = np.sort(linear)
+    ordered_linear = np.sort(linear)
+    ends = np.quantile(ordered, levels[:, (LEVELS - 1) // 2])
     corrected = np.empty_like(levels)
     # The upper quantiles follow by symmetry.
     for side, sign in ((0, 1), (1, -1)):
@@ -446,11 +448,11 @@ def _correct_levels(values, control_sample, levels, probability):
         # Levels beyond the table are not corrected.
         inside = tails >= nodes[0] * (1 - 1e-9)
         quantile_values = sign * np.interp(ndtri(tails[inside]), ndtri(nodes), quantiles)
-        observed = (np.searchsorted(ordered, quantile_values, side="right") + 1 / 6) / (
+        observed = (np.searchsorted(ordered_linear, quantile_values, side="right") + 1 / 6) / (
             len(linear) + 1 / 3
         )
         middle = np.argmin(np.abs(tails[inside] - (1 - probability) / 2))
-        is_below = values <= np.quantile(values, levels[side][(LEVELS - 1) // 2])
+        is_below = values <= ends[side]
         linear_below = linear <= quantile_values[middle]
         spread = observed[middle] * (1 - observed[middle])
         joint = np.mean(is_below & linear_below) - np.mean(is_below) * observed[middle]
