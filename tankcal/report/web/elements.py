@@ -344,8 +344,8 @@ def _face(style, letters):
     from fontTools.ttLib import TTFont
     from matplotlib import get_data_path
 
-    font = TTFont(Path(get_data_path()) / "fonts/ttf" / f"{_STYLES[style]}.ttf",
-                  recalcTimestamp=False)  # fmt: skip
+    path = Path(get_data_path()) / "fonts/ttf" / f"{_STYLES[style]}.ttf"
+    font = TTFont(path, recalcTimestamp=False, lazy=True)  # parses only the letters that remain
     options = subset.Options(notdef_outline=True, hinting=False, name_IDs=[])
     options.drop_tables += ["FFTM"]  # contains dates, which would change the bytes
     cut = subset.Subsetter(options)
