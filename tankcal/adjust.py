@@ -22,6 +22,7 @@ import scipy.linalg
 import scipy.sparse
 from scipy.special import ndtri
 
+from tankcal.covariance import PointCovariance
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 
@@ -129,15 +130,14 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
     model : callable
         model(x, l) -> (w, A, B): misclosures (m,), Jacobian by the unknowns (m, u) and Jacobian by
         the observations (m, n). B is dense, scipy.sparse, or None for a Gauss-Markov model (w =
-        F(x) - l).
+        F(x) - l). If each condition concerns a single point with d coordinates, n = m d, B has the
+        shape (m, d).
     unknowns : array_like, shape (u,)
         Start values, in the units of the model.
     observations : array_like, shape (n,)
         Observations, in the units of the model.
-    covariance : ndarray or sparse matrix
-        Variances (n,), or covariance (n, n), dense or sparse. Also (m, d, d) for m independent
-        points with d coordinates each, n = m d. Each condition then concerns a single point, and B
-        has the shape (m, d).
+    covariance : ndarray, sparse matrix or PointCovariance
+        Variances (n,), covariances (m, d, d) of independent points, or covariance (n, n).
     max_iterations : int, optional
         Largest number of iterations.
     tolerance : float, optional
@@ -173,11 +173,8 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
     l = np.asarray(observations, dtype=float)
     v, largest_step = np.zeros_like(l), np.inf
     q = scipy.sparse.diags_array(covariance) if np.ndim(covariance) == 1 else covariance
-    variances = np.einsum("kii->ki", q).ravel() if np.ndim(q) == 3 else q.diagonal()
-    # A fixed observation has the variance 0; the smallest float avoids a division by zero.
-    sd = np.sqrt(np.maximum(variances, np.finfo(float).tiny))
     # M = Q in a Gauss-Markov model, so that a single factor serves all iterations.
-    weight_whitener = cache(lambda: _whitener(q))
+    weight_whitener = cache(lambda: whitener(q))
     for iteration in range(1, max_iterations + 1):
         w, a, b = model(x, l + v)
         if len(w) < len(x):
@@ -189,12 +186,17 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
                     unknowns=len(x),
                 )
             )
+        if iteration == 1:
+            if isinstance(b, np.ndarray) and b.shape[1] < len(l):  # points, each in one condition
+                q = PointCovariance.convert(covariance, b.shape[1])
+            # A fixed observation has the variance 0; the smallest float avoids a division by zero.
+            sd = np.sqrt(np.maximum(q.diagonal(), np.finfo(float).tiny))
         # The misclosures refer to the original observations: w(l + v) - B v, with B = -I or the
         # Jacobian of the conditions.
         if b is None:  # B = -I
-            minus_qb, whiten, misclosures = q, weight_whitener(), w + v
+            correct, whiten, misclosures = q.__matmul__, weight_whitener(), w + v
         else:
-            minus_qb, whiten, bv = _propagate_conditions(q, b, v)
+            correct, whiten, bv = _propagate_conditions(q, b, v)
             misclosures = w - bv
         aw, ww = whiten(a), whiten(misclosures)
         # dx = -(A'M^-1 A)^-1 A'M^-1 w, from the whitened rows.
@@ -202,7 +204,7 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
         x = x + step
         normalised = ww + aw @ step
         # v = -Q B' M^-1 (A dx + w), with M^-1 applied as L^-T L^-1.
-        previous_v, v = v, minus_qb @ whiten(normalised, transposed=True)
+        previous_v, v = v, correct(whiten(normalised, transposed=True))
         # The length of a whitened column is the inverse of the standard deviation that the unknown
         # would have on its own.
         unknown_steps = np.abs(step) * np.linalg.norm(aw, axis=0)
@@ -499,35 +501,55 @@ def find_determined(pivots, rows, of_normals=False):
 
 
 def _propagate_conditions(q, b, v):
-    """Return -Q B', a function that multiplies by L^-1 with L L' = B Q B', and B v."""
-    if np.ndim(q) == 3:
-        # Independent points: M = B Q B' is diagonal, and -Q B' has d non-zero rows in each column.
-        minus_qb_blocks = _BlockColumns(-np.einsum("kij,kj->ki", q, b))
-        return (
-            minus_qb_blocks,
-            _diagonal_whitener(-np.sum(b * minus_qb_blocks.rows, axis=1)),
-            np.sum(b * v.reshape(b.shape), axis=1),
-        )
-    minus_qb = -(q @ b.T)
-    return minus_qb, _whitener(-(b @ minus_qb)), b @ v
+    """Return functions that multiply by -Q B' and by L^-1, with L L' = B Q B', and B v."""
+    if isinstance(q, PointCovariance):
+        # Each row of B has the d coordinates of its own point.
+        bv = np.sum(b * v.reshape(b.shape), axis=1)
+        return lambda y: -(q @ (b * y[:, None]).ravel()), whitener(q.mapped(b[:, None])), bv
+    qb = q @ b.T
+    return lambda y: -(qb @ y), whitener(b @ qb), b @ v
 
 
-@dataclass(frozen=True)
-class _BlockColumns:
-    """Matrix (k d, k) with d consecutive non-zero rows in each column, stored as (k, d)."""
+def whitener(covariance):
+    """Return a function that multiplies by L^-1, where L L' is a covariance (n, n).
 
-    rows: np.ndarray
+    Parameters
+    ----------
+    covariance : ndarray, sparse array or PointCovariance
+        Or variances (n,).
 
-    def __matmul__(self, vector):
-        return (self.rows * vector[:, None]).ravel()
+    Returns
+    -------
+    callable
+        whiten(array, transposed=False) -> L^-1 array or L^-T array, for an array (n,) or (n, k). L
+        is triangular or, for a PointCovariance with few shared unknowns, another root.
 
+    Raises
+    ------
+    SolutionError
+        If the covariance is not positive definite.
 
-def _whitener(m):
-    """Return a function that multiplies by L^-1 (or by L^-T), where L L' = m."""
-    diagonal = m.diagonal()
+    Examples
+    --------
+    >>> whitener(np.array([4.0, 9.0]))(np.array([[2.0], [6.0]])).ravel()
+    array([1., 2.])
+    """
+    m = covariance
+    if np.ndim(m) == 1:
+        return _diagonal_whitener(m)
+    if isinstance(m, PointCovariance):
+        if m.is_diagonal:
+            return _diagonal_whitener(m.independent.ravel())
+        try:
+            whiten = m.whitener()
+        except np.linalg.LinAlgError as error:
+            raise _indefinite() from error
+        if whiten is not None:
+            return whiten
+        m = m.dense()
     if scipy.sparse.issparse(m):
         # A sparse matrix that is diagonal needs no factorisation.
-        m = m.tocsr()
+        diagonal, m = m.diagonal(), m.tocsr()
         m.eliminate_zeros()
         if m.nnz <= len(diagonal):
             return _diagonal_whitener(diagonal)
@@ -535,12 +557,7 @@ def _whitener(m):
     try:
         factor = scipy.linalg.cholesky(m, lower=True)
     except scipy.linalg.LinAlgError as error:
-        raise SolutionError(
-            message(
-                "covariance_indefinite",
-                "the observations' covariance is not positive definite",
-            )
-        ) from error
+        raise _indefinite() from error
 
     def whiten(array, transposed=False):
         return scipy.linalg.solve_triangular(
@@ -548,6 +565,16 @@ def _whitener(m):
         )
 
     return whiten
+
+
+def _indefinite():
+    """SolutionError of a covariance that is not positive definite."""
+    return SolutionError(
+        message(
+            "covariance_indefinite",
+            "the observations' covariance is not positive definite",
+        )
+    )
 
 
 def _diagonal_whitener(diagonal):

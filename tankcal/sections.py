@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse
 
+from tankcal.covariance import PointCovariance
 from tankcal.geometry.circles import (
     Circle,
     circle_by_points,
@@ -29,7 +30,7 @@ from tankcal.geometry.outlines import (
 )
 
 RING_GAP, RING_SPREAD = 0.10, 0.15  # height gap between rings, height range of a ring; per course
-LEAST_SD_M = 1e-6  # regularises a dense covariance that is singular
+LEAST_SD_M = 1e-6  # regularises a singular covariance: a fixed point, or a free network
 HIGHEST_DEGREE, MOST_AMPLIFICATION = 2, 6.0  # in height; of u(mean radius) at an end of a course
 
 
@@ -270,71 +271,6 @@ def coordinates_of(points):
     return (3 * np.asarray(points)[:, None] + np.arange(3)).ravel()
 
 
-def covariance_of(points, covariance_m2):
-    """Covariance of selected points; a dense covariance is made positive definite.
-
-    Parameters
-    ----------
-    points : array_like of int, shape (k,)
-        Indices of the points.
-    covariance_m2 : ndarray or sparse matrix, shape (3n, 3n)
-        Covariance of all points, m2.
-
-    Returns
-    -------
-    ndarray or sparse matrix, shape (3k, 3k)
-        Covariance of the selected points, m2. A singular dense covariance (fixed point, free
-        network) is increased by the variance of one micrometre.
-
-    Examples
-    --------
-    >>> covariance_of([1], np.diag([1.0, 1, 1, 4, 5, 6])).diagonal().tolist()
-    [4.0, 5.0, 6.0]
-    """
-    index = coordinates_of(points)
-    if scipy.sparse.issparse(covariance_m2):
-        return covariance_m2[index][:, index]
-    block = covariance_m2[np.ix_(index, index)]
-    try:
-        np.linalg.cholesky(block)
-    except np.linalg.LinAlgError:
-        # Singular: a fixed point, or a free network.
-        block = block + LEAST_SD_M**2 * np.eye(len(index))
-    return block
-
-
-def own_covariances(covariance_m2):
-    """Covariance of each point, if the covariance of all points is sparse and block-diagonal.
-
-    Parameters
-    ----------
-    covariance_m2 : ndarray or sparse matrix, shape (3n, 3n)
-        Covariance of all points, m2.
-
-    Returns
-    -------
-    ndarray, shape (n, 3, 3), or None
-        Covariances in m2; None for a dense matrix or for correlated points.
-
-    Examples
-    --------
-    >>> own_covariances(scipy.sparse.diags_array([1.0, 2.0, 3.0])).diagonal(axis1=1, axis2=2)
-    array([[1., 2., 3.]])
-    """
-    if not scipy.sparse.issparse(covariance_m2):
-        return None
-    entries = covariance_m2.tocoo()
-    # An entry that relates two points contradicts independence.
-    (point, row), (column_point, column) = (
-        np.divmod(index, 3) for index in (entries.row, entries.col)
-    )
-    if np.any(point != column_point):
-        return None
-    blocks = np.zeros((covariance_m2.shape[0] // 3, 3, 3))
-    np.add.at(blocks, (point, row, column), entries.data)
-    return blocks
-
-
 def slide(xyz_m, slope, z_m):
     """Slide points parallel to the axis to the height z, and differentiate the result.
 
@@ -351,8 +287,8 @@ def slide(xyz_m, slope, z_m):
     -------
     xy_m : ndarray, shape (n, 2)
         Coordinates in the horizontal cut, m.
-    by_xyz : sparse array, shape (2n, 3n)
-        Derivatives d(xy) / d(xyz).
+    by_xyz : ndarray, shape (2, 3)
+        Derivative of the slid x and y of a point by its x, y, z.
 
     Notes
     -----
@@ -363,39 +299,17 @@ def slide(xyz_m, slope, z_m):
     Examples
     --------
     >>> xy, by_xyz = slide([[1.0, 0.0, 3.0]], (0.01, 0.0), 1.0)
-    >>> xy.tolist(), by_xyz.toarray()[0].tolist()
+    >>> xy.tolist(), by_xyz[0].tolist()
     ([[0.98, 0.0]], [1.0, 0.0, -0.01])
     """
-    n = len(xyz_m)
-    # Row 2i is x - slope_x (z - z_cut) of point i, row 2i + 1 is y - slope_y (z - z_cut).
-    rows = np.repeat(np.arange(2 * n), 2)
-    columns = np.add.outer(3 * np.arange(n), [0, 2, 1, 2]).ravel()
-    values = np.tile([1.0, -slope[0], 1.0, -slope[1]], n)
-    by_xyz = scipy.sparse.csr_array((values, (rows, columns)), shape=(2 * n, 3 * n))
-    return _slide_points(xyz_m, slope, z_m), by_xyz
-
-
-def _slide_points(xyz_m, slope, z_m):
-    """Coordinates (n, 2) of points slid parallel to the axis to the height z, m."""
-    xyz_m = np.asarray(xyz_m, dtype=float)
-    return xyz_m[:, :2] - (xyz_m[:, 2:] - z_m) * np.asarray(slope)
-
-
-def _slide_jacobian(slope):
-    """Derivative (2, 3) of the slid x and y of a point by its x, y, z."""
-    return np.column_stack([np.eye(2), -np.asarray(slope, dtype=float)])
+    xyz_m, slope = np.asarray(xyz_m, dtype=float), np.asarray(slope, dtype=float)
+    return xyz_m[:, :2] - (xyz_m[:, 2:] - z_m) * slope, np.column_stack([np.eye(2), -slope])
 
 
 def _project_to_plan(xyz_m, covariance_m2, slope, z_m):
-    """Points (n, 2) slid to the height z, and their covariance.
-
-    The covariance has the form of the input: (2n, 2n), or (n, 2, 2) for independent points.
-    """
-    if np.ndim(covariance_m2) == 3:
-        jacobian = _slide_jacobian(slope)
-        return _slide_points(xyz_m, slope, z_m), jacobian @ covariance_m2 @ jacobian.T
+    """Points (n, 2) slid to the height z, their PointCovariance, and the derivative (2, 3)."""
     xy, by_xyz = slide(xyz_m, slope, z_m)
-    return xy, by_xyz @ covariance_m2 @ by_xyz.T
+    return xy, PointCovariance.convert(covariance_m2, 3).mapped(by_xyz), by_xyz
 
 
 def sample_of(group, xyz_m, covariance_m2, slope, z_m):
@@ -418,7 +332,7 @@ def sample_of(group, xyz_m, covariance_m2, slope, z_m):
     not separate ovality from bulge. The factor differs from one by at most m^2 / 4 (6e-4 for 50
     mm/m), which the covariance neglects.
     """
-    xy, covariance_xy = _project_to_plan(xyz_m, covariance_m2, slope, z_m)
+    xy, covariance_xy, _ = _project_to_plan(xyz_m, covariance_m2, slope, z_m)
     # An algebraic circle is sufficient; the shift to the mean avoids cancellation.
     middle = xy.mean(axis=0)
     centre = taubin_circle(xy - middle)[:2] + middle
@@ -437,7 +351,7 @@ def fit_section(group, xyz_m, covariance_m2, slope, z_m, form_m2):
         The group.
     xyz_m : array_like, shape (n, 3)
         Coordinates of the members of the group, m.
-    covariance_m2 : ndarray or sparse matrix, shape (3n, 3n), or ndarray, shape (n, 3, 3)
+    covariance_m2 : PointCovariance or ndarray, shape (3n, 3n) or (n, 3, 3)
         Covariance in the order x1 y1 z1 x2 ..., m2; or of each point, if the points are
         independent.
     slope : array_like, shape (2,)
@@ -475,7 +389,7 @@ def fit_section(group, xyz_m, covariance_m2, slope, z_m, form_m2):
     >>> round(float(np.sqrt(section.circle.cofactor_m2[2, 2])) * 1000, 4)
     0.2887
     """
-    xy, covariance_xy = _project_to_plan(xyz_m, covariance_m2, slope, z_m)
+    xy, covariance_xy, by_xyz = _project_to_plan(xyz_m, covariance_m2, slope, z_m)
     circle = fit_circle(xy, covariance_xy)
     centre = circle.x_m, circle.y_m
     group_zeta, zeta = float(group.zeta(group.height_m)), _relative_heights(group, xyz_m, z_m)
@@ -483,7 +397,7 @@ def fit_section(group, xyz_m, covariance_m2, slope, z_m, form_m2):
     # Relative heights count from the height of the group, at which the outline is stated.
     outline = smooth_outline(xy, *centre, noise, form_m2, zeta - group_zeta, group.degree)
     # Chain rule: radii by plan coordinates, plan coordinates by x, y, z.
-    by_points = own_columns(radii_by_coordinates(outline, xy) @ _slide_jacobian(slope))
+    by_points = own_columns(radii_by_coordinates(outline, xy) @ by_xyz)
     return Section(group, circle, outline, by_points)
 
 
@@ -502,8 +416,9 @@ def circle_by_coordinates(section, xyz_m, covariance_m2, slope, z_m):
     ndarray, shape (3, 3n)
         Derivatives of x, y and radius by x1, y1, z1, x2, ...
     """
-    by_xy = circle_by_points(section.circle, *_project_to_plan(xyz_m, covariance_m2, slope, z_m))
-    return (by_xy.reshape(3, -1, 2) @ _slide_jacobian(slope)).reshape(3, -1)
+    xy, covariance_xy, by_xyz = _project_to_plan(xyz_m, covariance_m2, slope, z_m)
+    by_xy = circle_by_points(section.circle, xy, covariance_xy)
+    return (by_xy.reshape(3, -1, 2) @ by_xyz).reshape(3, -1)
 
 
 def _relative_heights(group, xyz_m, z_m):

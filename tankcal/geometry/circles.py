@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 import scipy.sparse
 
-from tankcal.adjust import Adjustment, adjust
+from tankcal.adjust import Adjustment, adjust, whitener
+from tankcal.covariance import PointCovariance
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 
@@ -59,9 +59,9 @@ def fit_circle(xy_m, covariance_m2):
     ----------
     xy_m : array_like, shape (n, 2)
         Points, m.
-    covariance_m2 : ndarray or sparse array, shape (2n, 2n) or (n, 2, 2)
-        Covariance of the coordinates in the order x1 y1 x2 y2 ..., m2; or one covariance matrix for
-        each point if the points are independent.
+    covariance_m2 : PointCovariance or ndarray, shape (2n, 2n), (2n,) or (n, 2, 2)
+        Covariance, or variances, of the coordinates in the order x1 y1 x2 y2 ..., m2; or one
+        covariance matrix for each point if the points are independent.
 
     Returns
     -------
@@ -89,10 +89,9 @@ def fit_circle(xy_m, covariance_m2):
     # Coordinates about the mean avoid cancellation with large map coordinates.
     centre = xy_m.mean(axis=0)
     local = xy_m - centre
-    model = _conditions_of_points if np.ndim(covariance_m2) == 3 else circle_conditions
     start = taubin_circle(local)
     try:
-        adjusted = adjust(model, start, local.ravel(), covariance_m2)
+        adjusted = adjust(circle_conditions, start, local.ravel(), covariance_m2)
     except SolutionError:
         # `adjust` does not converge: fall back on distances (see above).
         adjusted = _fit_distances(local, covariance_m2, start)
@@ -116,26 +115,16 @@ def _fit_distances(local, covariance_m2, start):
     """
     unknowns = start
     for _ in range(MOST_ROUNDS):
-        previous, distance_covariance = (
-            unknowns,
-            radial_covariance(local, unknowns[:2], covariance_m2),
-        )
-        variances = (
-            np.diag(distance_covariance)
-            if np.ndim(distance_covariance) == 1
-            else distance_covariance
-        )
+        previous = unknowns
+        whiten = whitener(radial_covariance(local, unknowns[:2], covariance_m2))
         # A damped step reduces the sum of squares even where the full step of `adjust` does not.
-        lower = scipy.linalg.cholesky(variances, lower=True)
-        unknowns = _fit_damped(local, lower, previous)
+        unknowns = _fit_damped(local, whiten, previous)
         if np.allclose(unknowns, previous, rtol=0, atol=SETTLED_M):
             break
     # Linearise once more at the solution: L^-1 v and L^-1 A give chi2 and the cofactor (A' Q^-1
     # A)^-1.
-    misclosure, by_circle, _ = _conditions_of_points(unknowns, local.ravel())
-    whitened, design = (
-        scipy.linalg.solve_triangular(lower, array, lower=True) for array in (misclosure, by_circle)
-    )
+    misclosure, by_circle, _ = circle_conditions(unknowns, local.ravel())
+    whitened, design = whiten(misclosure), whiten(by_circle)
     return Adjustment(
         unknowns=unknowns,
         cofactor=np.linalg.inv(design.T @ design),
@@ -147,13 +136,12 @@ def _fit_distances(local, covariance_m2, start):
     )
 
 
-def _fit_damped(local, lower, start):
-    """Minimise the whitened misclosures of `_conditions_of_points` (Levenberg-Marquardt)."""
+def _fit_damped(local, whiten, start):
+    """Minimise the whitened misclosures of `circle_conditions` (Levenberg-Marquardt)."""
     import scipy.optimize  # slow to import and needed only where the ordinary iteration fails
 
     def whitened(unknowns, index):
-        array = _conditions_of_points(unknowns, local.ravel())[index]
-        return scipy.linalg.solve_triangular(lower, array, lower=True)
+        return whiten(circle_conditions(unknowns, local.ravel())[index])
 
     solution = scipy.optimize.least_squares(
         whitened,
@@ -193,12 +181,9 @@ def circle_by_points(circle, xy_m, covariance_m2):
     [[0.25, 0.0], [0.0, 0.25], [-0.25, 0.0], [0.0, -0.25]]
     """
     unknowns = np.array([circle.x_m, circle.y_m, circle.radius_m])
-    _, by_circle, unit = _conditions_of_points(unknowns, np.asarray(xy_m, dtype=float).ravel())
-    spread = radial_covariance(xy_m, unknowns[:2], covariance_m2)
-    if np.ndim(spread) == 1:
-        weighted = by_circle.T / spread
-    else:
-        weighted = np.linalg.solve(spread, by_circle).T
+    _, by_circle, unit = circle_conditions(unknowns, np.asarray(xy_m, dtype=float).ravel())
+    whiten = whitener(radial_covariance(xy_m, unknowns[:2], covariance_m2))
+    weighted = whiten(whiten(by_circle), transposed=True).T
     # Normal equations with the weights of the distances: dx = -(A' Q^-1 A)^-1 A' Q^-1 d(distance).
     by_radii = -np.linalg.solve(weighted @ by_circle, weighted)
     # Chain rule: a distance changes by the component of the shift of its point along the unit
@@ -221,14 +206,9 @@ def circle_conditions(unknowns, coordinates):
     misclosures : ndarray, shape (n,)
         Distance of each point from the circle, m.
     by_unknowns : ndarray, shape (n, 3)
-    by_coordinates : sparse array, shape (n, 2n)
+    by_coordinates : ndarray, shape (n, 2)
+        By x and y of the point of each condition.
     """
-    misclosures, by_unknowns, unit = _conditions_of_points(unknowns, coordinates)
-    return misclosures, by_unknowns, own_columns(unit)
-
-
-def _conditions_of_points(unknowns, coordinates):
-    """Return `circle_conditions` with a last Jacobian (n, 2): each point by its coordinates."""
     x, y, radius = unknowns
     d = coordinates.reshape(-1, 2) - (x, y)
     distance = np.hypot(d[:, 0], d[:, 1])
@@ -299,27 +279,21 @@ def radial_covariance(xy_m, centre_m, covariance_m2):
         Points, m.
     centre_m : array_like, shape (2,)
         Centre, m.
-    covariance_m2 : ndarray or sparse array, shape (2n, 2n) or (n, 2, 2)
-        Covariance of the coordinates in the order x1 y1 x2 y2 ..., m2, or one covariance matrix for
-        each point.
+    covariance_m2
+        As in `fit_circle`.
 
     Returns
     -------
-    ndarray, shape (n, n) or (n,)
-        Covariance, m2; variances (n,) if the points are independent (a sparse covariance, or one
-        matrix for each point).
+    PointCovariance
+        Of n points with a single coordinate, m2.
 
     Examples
     --------
-    >>> radial_covariance([[1, 0], [0, 2]], (0, 0), np.diag([1.0, 2.0, 3.0, 4.0]))
+    >>> radial_covariance([[1, 0], [0, 2]], (0, 0), np.diag([1.0, 2.0, 3.0, 4.0])).dense()
     array([[1., 0.],
            [0., 4.]])
     """
     d = np.asarray(xy_m) - centre_m
     # The derivative of a distance by its point is the unit vector from the centre.
     unit = d / np.hypot(d[:, 0], d[:, 1])[:, None]
-    if np.ndim(covariance_m2) == 3:
-        return np.einsum("ki,kij,kj->k", unit, covariance_m2, unit)
-    radial = own_columns(unit)
-    covariance = radial @ covariance_m2 @ radial.T
-    return covariance.diagonal() if scipy.sparse.issparse(covariance) else covariance
+    return PointCovariance.convert(covariance_m2, 2).mapped(unit[:, None])

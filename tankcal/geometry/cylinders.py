@@ -105,7 +105,7 @@ def fit_cylinder(xyz_m, covariance_m2):
     ----------
     xyz_m : array_like, shape (n, 3)
         Points, m.
-    covariance_m2 : ndarray or sparse array, shape (3n, 3n) or (3n,)
+    covariance_m2 : PointCovariance or ndarray, shape (3n, 3n) or (3n,)
         Covariance, or variances, of the coordinates in the order x1 y1 z1 x2 ..., m2.
 
     Returns

@@ -17,8 +17,9 @@ join to a circle).
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 
+from tankcal.adjust import whitener
+from tankcal.covariance import PointCovariance
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 from tankcal.quadrature import panels, polar_products
@@ -37,8 +38,8 @@ class Sample:
     ----------
     azimuth_rad, radius_m : ndarray, shape (n,)
         Azimuths and radii about the centre, rad and m.
-    covariance_m2 : ndarray, shape (n, n) or (n,)
-        Covariance, or variances, of the radii, m2.
+    covariance_m2 : PointCovariance
+        Covariance of the radii, m2.
     zeta : ndarray, shape (n,)
         Height within the course, -1 at its bottom to +1 at its top.
     centre_m : ndarray, shape (2,)
@@ -47,7 +48,7 @@ class Sample:
 
     azimuth_rad: np.ndarray
     radius_m: np.ndarray
-    covariance_m2: np.ndarray
+    covariance_m2: PointCovariance
     zeta: np.ndarray
     centre_m: np.ndarray
 
@@ -190,33 +191,6 @@ def free_columns(azimuth_rad, zeta, degree):
     return np.hstack(columns[: degree + 1])
 
 
-def whiten(array, covariance, transposed=False):
-    """Return L^-1 array (or L^-T array) with covariance = L L'.
-
-    Parameters
-    ----------
-    array : ndarray, shape (n, ...)
-    covariance : ndarray, shape (n, n) or (n,)
-        Covariance, or variances.
-    transposed : bool, optional
-        True: L^-T.
-
-    Returns
-    -------
-    ndarray
-        Same shape as `array`.
-
-    Examples
-    --------
-    >>> whiten(np.array([[2.0], [6.0]]), np.array([4.0, 9.0])).ravel()
-    array([1., 2.])
-    """
-    if np.ndim(covariance) == 1:
-        return array / np.sqrt(covariance)[:, None]
-    factor = np.linalg.cholesky(covariance)
-    return scipy.linalg.solve_triangular(factor, array, lower=True, trans=int(transposed))
-
-
 @dataclass(frozen=True)
 class Outline:
     """Outline of a section: r(azimuth) = basis(azimuth) @ parameters about (x_m, y_m).
@@ -344,8 +318,8 @@ def smooth_outline(xy_m, x_m, y_m, noise_m2, form_m2, away, degree):
         Points, m.
     x_m, y_m : float
         Centre, m.
-    noise_m2 : ndarray, shape (n, n) or (n,)
-        Covariance of the measured radii, m2.
+    noise_m2 : PointCovariance or ndarray, shape (n, n) or (n,)
+        Covariance, or variances, of the measured radii, m2.
     form_m2 : float
         Amplitude of the form of the shell, m2.
     away : ndarray, shape (n,)
@@ -383,7 +357,8 @@ def smooth_outline(xy_m, x_m, y_m, noise_m2, form_m2, away, degree):
 
 def _solve_regularised(design, free, noise_m2):
     """Return estimates (p, n) by the radii, with a unit prior on columns from `free` on."""
-    white = whiten(design, noise_m2)
+    whiten = whitener(noise_m2)
+    white = whiten(design)
     normal = white.T @ white
     bound = np.arange(free, len(normal))
     normal[bound, bound] += 1.0
@@ -395,7 +370,7 @@ def _solve_regularised(design, free, noise_m2):
             )
         )
     # (A' Q^-1 A + prior)^-1 A' Q^-1, one column for each radius.
-    return np.linalg.solve(normal, whiten(white, noise_m2, transposed=True).T)
+    return np.linalg.solve(normal, whiten(white, transposed=True).T)
 
 
 def radii_by_coordinates(outline, xy_m):

@@ -14,7 +14,7 @@ Source: Ahn 2004, Least Squares Orthogonal Distance Fitting.
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
@@ -97,7 +97,7 @@ def fit_ellipse(xy_m, covariance_m2):
     ----------
     xy_m : ndarray, shape (n, 2)
         Points, m.
-    covariance_m2 : ndarray, shape (2n, 2n) or (2n,)
+    covariance_m2 : PointCovariance or ndarray, shape (2n, 2n) or (2n,)
         Covariance, dense or sparse, or variances, in the order x1 y1 x2 y2 ..., m2.
 
     Returns
@@ -159,7 +159,7 @@ def fit_sphere(xyz_m, covariance_m2):
     ----------
     xyz_m : array_like, shape (n, 3)
         Points, m.
-    covariance_m2 : ndarray or sparse array, shape (3n, 3n) or (3n,)
+    covariance_m2 : PointCovariance or ndarray, shape (3n, 3n) or (3n,)
         Covariance, or variances, of the coordinates in the order x1 y1 z1 x2 ..., m2.
 
     Returns
@@ -313,17 +313,11 @@ def conditions_of(distances, dimensions=3):
     Returns
     -------
     callable
-        (unknowns, coordinates) -> misclosures and both Jacobians, the second as a sparse array.
+        (unknowns, coordinates) -> misclosures and both Jacobians, the second (n, k) by the
+        coordinates of the point of each condition.
     """
 
-    def conditions(unknowns, coordinates):
-        points = coordinates.reshape(-1, dimensions)
-        distance, by_unknowns, normal = distances(unknowns, points)
-        places = (np.arange(points.size), np.arange(0, points.size + 1, dimensions))
-        shape = (len(points), points.size)
-        return distance, by_unknowns, scipy.sparse.csr_array((normal.ravel(), *places), shape=shape)
-
-    return conditions
+    return lambda unknowns, coordinates: distances(unknowns, coordinates.reshape(-1, dimensions))
 
 
 def descend_distances(distances, unknowns, points, steps=100):

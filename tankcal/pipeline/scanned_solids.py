@@ -41,7 +41,8 @@ from tankcal.pipeline.checks.survey import noise_is_estimated, origin_of
 from tankcal.pipeline.overruling import decisions_of, refuse_kept
 from tankcal.pipeline.tanks.common import factor_of_unseen
 from tankcal.pipeline.tanks.solid import solid_as_surveyed
-from tankcal.sections import coordinates_of, covariance_of
+from tankcal.pipeline.wall.surveyed import given_covariance
+from tankcal.sections import LEAST_SD_M, coordinates_of
 from tankcal.tank.budgets import Factor, survey_factors
 from tankcal.tank.solids import NODES, SurveyedForm, node_levels
 from tankcal.units import FULL_TURN
@@ -106,8 +107,8 @@ def scanned_wall(job, fitted, chosen, covariance_m2, dof):
     fitted : Fitted
     chosen : ndarray of int, shape (m,)
         Indices of the accepted points.
-    covariance_m2 : ndarray, shape (3m, 3m) or (3m,)
-        Covariance or variances of these points, m2.
+    covariance_m2 : PointCovariance
+        Covariance of these points, m2.
     dof : float
         Degrees of freedom of the covariance.
     """
@@ -233,8 +234,8 @@ def _readings(job, fit, chosen, covariance_m2):
     fit : sphere or cylinder
     chosen : ndarray of int, shape (m,)
         Indices of the accepted points.
-    covariance_m2 : ndarray, shape (3m, 3m) or (3m,)
-        Covariance or variances of these points, m2.
+    covariance_m2 : PointCovariance
+        Covariance of these points, m2.
     """
     xyz = job.points.xyz_m[chosen]
     means = means_of_neighbours(xyz)
@@ -254,11 +255,7 @@ def _readings(job, fit, chosen, covariance_m2):
         (normal.ravel(), np.arange(normal.size), ends), shape=(len(normal), normal.size)
     )
     by_points = means @ normals
-    if np.ndim(covariance_m2) == 1:
-        noise = (by_points * covariance_m2) @ by_points.T
-        noise = noise.toarray()
-    else:
-        noise = by_points @ (covariance_m2 @ by_points.T.toarray())
+    noise = covariance_m2.propagate(by_points)
     return _Readings(places, -(means @ by_unknowns), means @ distance, noise, by_points)
 
 
@@ -464,12 +461,8 @@ def _near(residuals, is_used):
 
 
 def _covariance(points, index):
-    """Covariance of points (m,): variances (3m,) or a positive definite matrix (3m, 3m)."""
-    if points.covariance_m2 is not None:
-        return covariance_of(index, points.covariance_m2)
-    if points.sd_m is None:
-        return np.ones(3 * len(index))
-    return points.sd_m[index].ravel() ** 2
+    """Positive definite `PointCovariance` of points (m,)."""
+    return given_covariance(points, index).definite(LEAST_SD_M)
 
 
 def _fitted(job, is_used):

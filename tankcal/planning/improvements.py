@@ -284,7 +284,7 @@ def count_poor_targets(plan, seen, result):
         With set-ups, rays are not counted, as one set-up determines a target.
     """
     count = len(plan.targets.names)
-    lost = count - len(result.covariance.points)
+    lost = count - len(result.points)
     wanted = 0 if plan.setups else plan.limits.rays
     return max(lost, int(np.sum(seen.rays[:count] < wanted)))
 

@@ -15,7 +15,6 @@ from tankcal.planning.contract import PLAN_FILE
 from tankcal.planning.measurements import measurements_of, nominal_of
 from tankcal.planning.model import Plan
 from tankcal.planning.table import (
-    PredictedCovariance,
     PredictedTable,
     TableResults,
     assess_reliability,
@@ -116,14 +115,14 @@ class Prediction(TableResults):
     @cached_property
     def precision(self):
         """Mean sds and homogeneity of the determined targets (`network.quality.Precision`)."""
-        adjusted, points = self.network.adjusted, self.result.covariance.points
+        adjusted, points = self.network.adjusted, self.result.points
         return precision(adjusted.xyz_m[points], adjusted.point_covariances_m2[points])
 
     @cached_property
     def reliability(self):
         """Effects of undetected blunders, a tuple of GroupReliability."""
         result = self.result
-        return assess_reliability(self.plan, self.network, result.covariance, result.by_points_m2)
+        return assess_reliability(self.plan, self.network, result.points, result.by_points_m2)
 
     @cached_property
     def sections(self):
@@ -261,8 +260,8 @@ def sections_of(result):
     Standard deviations of the centre are relative to the wall: common motions of all points are
     excluded.
     """
-    wall, covariance = result.wall, result.covariance
-    rows, n = [], 3 * len(covariance.points)
+    wall, covariance = result.wall, result.wall.covariance_m2
+    rows, n = [], covariance.shape[0]
     for section in wall.sections:
         members = section.group.members
         x, y, _ = result.job.points.xyz_m[wall.accepted[members]].T
@@ -291,14 +290,7 @@ def sections_of(result):
 def list_warnings(prediction):
     """Return a tuple of Problem for the plan, its network, the wall and the table."""
     result = prediction.result
-    points, adjusted = result.job.points, result.covariance.adjusted
-    number = {name: i for i, name in enumerate(adjusted.survey.points)}
-    covariance = PredictedCovariance(adjusted, np.array([number[name] for name in points.names]))
-    of_table = check_table(
-        replace(result.job, points=replace(points, covariance_m2=covariance)),
-        result.wall,
-        result.computed_table,
-    )
+    of_table = check_table(result.job, result.wall, result.computed_table)
     of_run = (
         *prediction.network.frame.warnings,
         *open_questions(result.job, prediction.datum, result.job.points.causes),

@@ -1,12 +1,5 @@
 """Predict the table of a surveyed tank: wall, volumes and U of every row, and the limit of a plan.
 
-The covariance of many predicted points is an operator; the dense matrix is not formed. The volume
-needs only products of the covariance with a few columns. Q M follows from the reduced normal
-equations with 3n times d numbers instead of 3n times 3n.
-
-Common translations and the common rotation about the vertical are removed with D and A of
-`wall.s_transform`: C' = C - D A' - A D'.
-
 Reliability of a planned survey: effects of undetected blunders on the volume.
 
 The smallest detectable blunder has the size delta0 s / sqrt(r). A smaller blunder of a reading
@@ -24,7 +17,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import scipy.sparse
 
 from tankcal.adjust import UNCONTROLLED, noncentrality
 from tankcal.errors import InputError, Problem, SolutionError
@@ -35,7 +27,7 @@ from tankcal.pipeline.statements import MINIMA_M, statements
 from tankcal.pipeline.table import ComputedTable, compute_table
 from tankcal.pipeline.tanks.vertical import volume_by_points
 from tankcal.pipeline.wall.finding import find_wall
-from tankcal.pipeline.wall.surveyed import Wall, common_motions, s_transform_factors
+from tankcal.pipeline.wall.surveyed import Wall, s_transform
 from tankcal.planning.model import TAPED
 from tankcal.planning.places import base_sd_m
 from tankcal.solver.effects import covariances
@@ -43,7 +35,6 @@ from tankcal.survey.observations import ImageCoordinates
 from tankcal.survey.points import Points, move_to_wall
 from tankcal.survey.results import causes_of
 
-MANY = 400  # largest number of points whose dense covariance weights the outlines
 # Single readings of a repeated measurement. The network of a plan contains only their mean.
 #
 # A mean has the sum of the weights of its readings. A reading has the share p of this sum, which
@@ -65,78 +56,17 @@ SIGHTED = ("directions", "zenith_angles", "slope_distances")  # tables of total 
 
 
 @dataclass(frozen=True)
-class PredictedCovariance:
-    """Covariance (3n, 3n) of selected points of a predicted network.
-
-    adjusted: network.Adjusted; points: indices (n,) of the points in the network.
-    """
-
-    adjusted: object
-    points: np.ndarray
-
-    @property
-    def shape(self):
-        """Shape of the covariance, (3n, 3n)."""
-        return (3 * len(self.points),) * 2
-
-    def __matmul__(self, matrix):
-        """Product of C' and a matrix, shape (3n, d)."""
-        return (
-            self._in_frame(matrix)
-            - self._basis @ (self._across.T @ matrix)
-            - (self._across @ (self._basis.T @ matrix))
-        )
-
-    def _in_frame(self, matrix):
-        """Product of C, in the datum of the network, and a matrix."""
-        columns = self.adjusted.problem.layout.points[self.points].ravel()
-        product = covariances(self.adjusted.solution.cofactor, columns, matrix.T)
-        return np.vstack([product, np.zeros((1, product.shape[1]))])[columns]
-
-    @cached_property
-    def _basis(self):
-        return common_motions(self.adjusted.xyz_m[self.points])
-
-    @cached_property
-    def _across(self):
-        trace = np.einsum("nii->", self.adjusted.point_covariances_m2[self.points])
-        # The trace of C determines s2 of A = C D - D (D'C D + s2 I) / 2.
-        return s_transform_factors(self._basis, self._in_frame(self._basis), trace)
-
-    def remove_common_motions(self, column):
-        """Effects (3n,) of one cause on the points, without the common motions."""
-        return column - self._basis @ (self._basis.T @ column)
-
-    def diagonal(self):
-        """Variances, shape (3n,)."""
-        return self.block_diagonal().diagonal()
-
-    def dense(self):
-        """Dense covariance (3n, 3n); for few points only."""
-        cross = self._basis @ self._across.T  # D A'
-        return self.adjusted.covariance_m2(self.points) - cross - cross.T
-
-    def block_diagonal(self):
-        """Sparse matrix (3n, 3n) of the covariance blocks of single points, no correlations."""
-        n = len(self.points)
-        basis, across = (part.reshape(n, 3, 4) for part in (self._basis, self._across))
-        cross = basis @ np.swapaxes(across, 1, 2)
-        block = self.adjusted.point_covariances_m2[self.points] - cross - np.swapaxes(cross, 1, 2)
-        return scipy.sparse.bsr_array((block, np.arange(n), np.arange(n + 1))).tocsr()
-
-
-@dataclass(frozen=True)
 class PredictedTable:
     """Predicted wall, capacity table and statements.
 
-    job is the plan's job with the points of the wall; covariance is the PredictedCovariance of the
-    accepted points.
+    job is the plan's job with the points of the wall; points (n,) are the numbers of the accepted
+    points in the predicted network.
     """
 
     job: Job
     wall: Wall
     computed_table: ComputedTable
-    covariance: PredictedCovariance
+    points: np.ndarray
 
     @cached_property
     def stated(self):
@@ -157,13 +87,11 @@ def predict_table(plan, network):
     Raises SolutionError if the vertical or the scale is not determined, and InputError if a section
     or course keeps too few targets.
     """
-    targets, covariance = _find_determined(plan, network)
-    job = replace(plan.job, points=_points(plan, targets, covariance), measurements=None)
+    targets, numbers = _find_determined(plan, network)
+    points = _points(plan, targets, network.adjusted, numbers)
+    job = replace(plan.job, points=points, measurements=None)
     wall = find_wall(job, lambda text: None, amplitudes=plan.amplitudes)
-    if len(wall.accepted) < len(targets):
-        covariance = PredictedCovariance(covariance.adjusted, covariance.points[wall.accepted])
-    wall = replace(wall, covariance_m2=covariance)
-    return PredictedTable(job, wall, compute_table(job, wall), covariance)
+    return PredictedTable(job, wall, compute_table(job, wall), numbers[wall.accepted])
 
 
 def recompute_table(plan, network, before):
@@ -184,19 +112,19 @@ def recompute_table(plan, network, before):
     PredictedTable or None
         None if the walls differ.
     """
-    targets, covariance = _find_determined(plan, network)
+    targets, numbers = _find_determined(plan, network)
     known = before.job.points
     names = tuple(plan.targets.names[i] for i in targets)
     if names != known.names or len(before.wall.accepted) < len(names):
         return None
-    points = replace(known, causes=_causes(covariance))
+    points = _set_covariance(known, network.adjusted, numbers)
     job = replace(before.job, points=points)
-    wall = replace(before.wall, covariance_m2=covariance)
-    return PredictedTable(job, wall, compute_table(job, wall), covariance)
+    wall = replace(before.wall, covariance_m2=points.covariance_m2)
+    return PredictedTable(job, wall, compute_table(job, wall), numbers)
 
 
 def _find_determined(plan, network):
-    """Return the indices of the determined targets, and their PredictedCovariance."""
+    """Return the indices of the determined targets, and their numbers in the network."""
     refuse_undetermined(network.frame.report)
     adjusted = network.adjusted
     place = {name: i for i, name in enumerate(adjusted.survey.points)}
@@ -206,41 +134,31 @@ def _find_determined(plan, network):
         raise SolutionError(
             message("plan_no_target_determined", "no target of the wall would be determined")
         )
-    points = np.array([place[plan.targets.names[i]] for i in indices])
-    return indices, PredictedCovariance(adjusted, points)
+    return indices, np.array([place[plan.targets.names[i]] for i in indices])
 
 
-def _causes(covariance):
-    """Return the common causes of error of the wall points, without their common motions."""
-    causes = causes_of(covariance.adjusted, covariance.points, 1.0)
-    return tuple(
-        replace(cause, column_m=covariance.remove_common_motions(cause.column_m))
-        for cause in causes
-    )
+def _set_covariance(points, adjusted, numbers):
+    """Return points of the wall with their covariance and causes in a predicted network."""
+    covariance = adjusted.covariance_of_points(numbers)
+    causes = causes_of(adjusted, numbers, 1.0)
+    return s_transform(replace(points, covariance_m2=covariance, causes=causes))
 
 
-def _points(plan, indices, covariance):
-    """Return job.Points of the wall.
-
-    A smoothed outline weights its points with their covariance. With more than MANY points, it uses
-    the covariance of single points. The weights change slightly; the propagation does not.
-    """
-    targets, adjusted = plan.targets, covariance.adjusted
-    section = tuple(targets.section[i] for i in indices)
-    is_small = len(indices) <= MANY
-    written = covariance.dense() if is_small else covariance.block_diagonal()
+def _points(plan, indices, adjusted, numbers):
+    """Return job.Points of the wall."""
+    targets = plan.targets
     outwards = targets.offset_m * (1.0 if plan.shell.is_outside else -1.0)
-    return Points(
+    points = Points(
         names=tuple(targets.names[i] for i in indices),
-        xyz_m=move_to_wall(adjusted.xyz_m[covariance.points], np.full(len(indices), outwards)),
+        xyz_m=move_to_wall(adjusted.xyz_m[numbers], np.full(len(indices), outwards)),
         sd_m=None,
-        covariance_m2=written,
-        section=section,
+        covariance_m2=None,
+        section=tuple(targets.section[i] for i in indices),
         generatrix=tuple(targets.generatrix[i] for i in indices),
         rows=(None,) * len(indices),
-        causes=_causes(covariance),
         from_adjustment=True,
     )
+    return _set_covariance(points, adjusted, numbers)
 
 
 # ---- the limit of a plan
@@ -423,7 +341,7 @@ class GroupReliability:
     per_unit_of: tuple
 
 
-def assess_reliability(plan, network, covariance, by_points_m2):
+def assess_reliability(plan, network, points, by_points_m2):
     """Return a GroupReliability of each kind and name of readings (alpha 0.001, power 0.80).
 
     Parameters
@@ -431,8 +349,8 @@ def assess_reliability(plan, network, covariance, by_points_m2):
     plan : Plan
     predicted : Predicted
         Predicted survey of the plan.
-    covariance : PredictedCovariance
-        Covariance of n points.
+    points : ndarray of int, shape (n,)
+        Numbers of the points of the wall in the network.
     by_points_m2 : ndarray, shape (3n,)
         Derivative of the volume of the full tank by the coordinates of these points.
 
@@ -444,7 +362,7 @@ def assess_reliability(plan, network, covariance, by_points_m2):
     problem, solution = adjusted.problem, adjusted.solution
     # Q g' is common to all readings; j Q g' is the effect of a whitened unit error.
     # The last element belongs to fixed unknowns.
-    columns = problem.layout.points[covariance.points].ravel()
+    columns = problem.layout.points[points].ravel()
     pull = np.append(covariances(solution.cofactor, columns, by_points_m2[None])[:, 0], 0.0)
     groups = []
     for number, table in enumerate(problem.observations):

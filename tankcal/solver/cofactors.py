@@ -7,6 +7,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse
 
+from tankcal.covariance import PointCovariance
 from tankcal.solver.compiled import is_worth_compiling, threads_for
 from tankcal.solver.elimination import (
     add_own_cofactors,
@@ -205,6 +206,49 @@ class Cofactors:
             q = whitened.T @ whitened
         add_own_cofactors(self.plan, normals, columns, q)
         return q if self.datum is None else self._transform_to_datum(q, columns, columns)
+
+    def point_covariance(self, columns):
+        """`PointCovariance` of points, in the datum.
+
+        Parameters
+        ----------
+        columns : ndarray of int, shape (k, 3)
+            Unknowns of each point: a block, or reduced unknowns; -1 for a fixed coordinate.
+
+        Returns
+        -------
+        PointCovariance
+
+        Notes
+        -----
+        Q_bb = V^-1 + V^-1 W S^-1 W' V^-1: a point adds the block V^-1 and follows the
+        reduced unknowns. A point of reduced unknowns adds no block.
+        """
+        nr = self.plan.reduced
+        blocks = np.zeros((len(columns), 3, 3))
+        eliminated = columns[:, 0] >= nr
+        root = self.inverse_roots[(columns[eliminated, 0] - nr) // 3]
+        blocks[eliminated] = root.transpose(0, 2, 1) @ root
+        # The additional last row serves fixed coordinates.
+        rows = np.where(columns < 0, nr + 3 * self.plan.blocks, columns).ravel()
+        by_reduced = scipy.sparse.vstack(
+            [
+                scipy.sparse.eye_array(nr),
+                scipy.sparse.csr_array(self.back_substitution),
+                scipy.sparse.csr_array((1, nr)),
+            ],
+            format="csr",
+        )
+        by_reduced = by_reduced[rows]
+        if len(rows) * nr < DENSE:
+            by_reduced = by_reduced.toarray()
+        covariance = PointCovariance(blocks, by_reduced, self.reduced_cofactors)
+        if self.datum is None:
+            return covariance
+        null_space, h, m = (np.vstack([part, np.zeros(part.shape[1])]) for part in self.datum)
+        eye = np.eye(len(m) - 1)
+        joint = np.block([[m[:-1], -eye], [-eye, np.zeros_like(eye)]])
+        return covariance.add_columns(np.hstack([null_space[rows], h[rows]]), joint)
 
     @cached_property
     def datum(self):

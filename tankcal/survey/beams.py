@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tankcal.covariance import PointCovariance
 from tankcal.survey.points import Points
 from tankcal.survey.results import Cause
 from tankcal.survey.sighting import NETWORK, bias_by_incidence
@@ -72,8 +73,9 @@ def points_of_beams(xyz_m, sd_m, scan, normal, registration, tools, *, file="", 
     n = len(xyz_m)
     # Covariance = sum of column column' over the shared causes + the independent variances.
     columns = np.column_stack([cause.column_m for cause in shared.causes] or [np.zeros(3 * n)])
-    covariance = columns @ columns.T
-    covariance[np.diag_indices(3 * n)] += np.repeat(sd_m**2, 3)
+    covariance = PointCovariance.convert(np.repeat(sd_m**2, 3), 3).add_columns(
+        columns, np.eye(columns.shape[1])
+    )
     names = tuple(registration.scans[i].name for i in scan)
     points = Points(
         names=tuple(f"{name} {i + 1}" for i, name in enumerate(names)),

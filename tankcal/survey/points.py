@@ -4,12 +4,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tankcal.covariance import PointCovariance
 from tankcal.errors import SolutionError
 from tankcal.geometry.circles import taubin_circle
 from tankcal.messages import message
 from tankcal.survey.results import Cause
-
-LARGEST = 2500  # points with a full covariance: 7500 x 7500 numbers, 450 MB
 
 
 @dataclass(frozen=True)
@@ -24,8 +23,8 @@ class Points:
         Coordinates.
     sd_m : ndarray, shape (n, 3), or None
         Standard deviations; None: not given (estimated from residuals).
-    covariance_m2 : ndarray, shape (3n, 3n), or None
-        None: not given.
+    covariance_m2 : ndarray, shape (3n, 3n), PointCovariance, or None
+        Matrix from a file, or the covariance of a survey; None: not given.
     section, generatrix : tuple
         Section and generatrix of each point, text or None.
     causes : tuple
@@ -45,7 +44,7 @@ class Points:
     names: tuple
     xyz_m: np.ndarray
     sd_m: np.ndarray | None
-    covariance_m2: np.ndarray | None
+    covariance_m2: np.ndarray | PointCovariance | None
     section: tuple
     generatrix: tuple
     rows: tuple
@@ -82,7 +81,7 @@ def wall_points(adjustment, measurements, side):
     Raises
     ------
     SolutionError
-        If no point or too many points remain.
+        If no point remains.
     """
     targets = measurements.targets
     place = {name: i for i, name in enumerate(adjustment.names)}
@@ -92,7 +91,13 @@ def wall_points(adjustment, measurements, side):
         stations = {cause.station for cause in measurements.setups}
         rows = dict.fromkeys((name for name in place if name not in stations), None)
     names = tuple(rows)
-    _refuse_size(len(names))
+    if not names:
+        raise SolutionError(
+            message(
+                "no_target_adjusted",
+                "no target of targets.csv was adjusted: no point is left for the wall",
+            )
+        )
     indices = np.array([place[name] for name in names])
     xyz = adjustment.xyz_m[indices]
     section = generatrix = numbers = (None,) * len(names)
@@ -104,7 +109,7 @@ def wall_points(adjustment, measurements, side):
         offset = np.nan_to_num(np.asarray(targets.offset_m, dtype=float)[target_rows])
         # Seen from inside, the target is on the inner side of the wall: the offset changes sign.
         xyz = move_to_wall(xyz, offset if side == "outside" else -offset)
-    covariance = adjustment.full_covariance_m2(names)
+    covariance = adjustment.covariance_of_points(names)
     coordinates = (3 * indices[:, None] + np.arange(3)).ravel()
     causes = tuple(
         Cause(cause.name, cause.what, cause.u, cause.unit, cause.column_m[coordinates])
@@ -156,26 +161,3 @@ def move_to_wall(xyz_m, outwards_m):
     moved = xyz_m.copy()
     moved[:, :2] -= outwards_m[:, None] * normal
     return moved
-
-
-def _refuse_size(n):
-    """Raise SolutionError if a wall has no point, or too many for a full covariance."""
-    if not n:
-        raise SolutionError(
-            message(
-                "no_target_adjusted",
-                "no target of targets.csv was adjusted: no point is left for the wall",
-            )
-        )
-    if n > LARGEST:
-        raise SolutionError(
-            message(
-                "wall_too_large",
-                "{n} points of the wall were adjusted; at most {largest} can be used with "
-                "their full covariance, {megabytes} MB for all of them and four times that for "
-                "twice the points: name the targets to use in targets.csv",
-                n=n,
-                largest=LARGEST,
-                megabytes=round(8e-6 * (3 * n) ** 2),
-            )
-        )

@@ -563,3 +563,8 @@ class Adjustment:
         selection = self.names if names is None else names
         place = {name: i for i, name in enumerate(self.adjusted.survey.points)}
         return self.cov_scale * self.adjusted.covariance_m2([place[name] for name in selection])
+
+    def covariance_of_points(self, names):
+        """`PointCovariance` of the named points, scaled by `cov_scale`."""
+        place = {name: i for i, name in enumerate(self.adjusted.survey.points)}
+        return self.adjusted.covariance_of_points([place[name] for name in names]) * self.cov_scale

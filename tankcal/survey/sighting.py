@@ -15,7 +15,10 @@ Source: ISO 7507-4; API MPMS 2.2D (method).
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import scipy.linalg
+import scipy.sparse
 
+from tankcal.covariance import PointCovariance
 from tankcal.geometry.circles import taubin_circle
 from tankcal.survey.points import Points
 from tankcal.survey.readings import certified_distance_m
@@ -91,9 +94,17 @@ class Beside:
         Points
         """
         targets, count = self.points, len(sights.names)
-        across = by_poses @ self.with_poses
-        covariance = np.block([[sights.covariance_m2, across], [across.T, targets.covariance_m2]])
-        more = 3 * len(targets.names)
+        first, second = sights.covariance_m2, targets.covariance_m2
+        more, unknowns = 3 * len(targets.names), len(self.with_poses)
+        # The sights follow the poses, which have the covariance `with_poses` with the targets: the
+        # columns of each, and a pair that joins them.
+        columns = scipy.sparse.block_diag([first.columns, second.columns], format="csr")
+        joined = scipy.linalg.block_diag(by_poses, self.with_poses.T)
+        covariance = PointCovariance(
+            np.concatenate([first.independent, second.independent]),
+            columns,
+            scipy.linalg.block_diag(first.cofactor, second.cofactor),
+        ).add_columns(joined, np.kron([[0, 1], [1, 0]], np.eye(unknowns)))
 
         def longer(column):
             return np.pad(column, (0, more))
@@ -127,8 +138,7 @@ class Sighting:
     Attributes
     ----------
     points : Points
-        All n hits, including those compared only. In a `Result` they have no covariance, which may
-        need half a gigabyte; `sight` recomputes it from hits and poses.
+        All n hits, including those compared only.
     poses : Poses
     pose : ndarray of int, shape (n,)
         Index of the pose of each hit.
@@ -215,12 +225,11 @@ def sight(hits, poses, told_m=None, incidence=None):
     causes, unbound = _causes(hits, poses, jacobian, tool, ray, cosine)
     unbound += _causes_of_untied(poses, jacobian)
     biases = [cause.column_m for cause in causes if cause.what == "incidence"]
-    # Factored as (J Q | biases) (J | biases)': one product instead of two.
-    covariance = (
-        np.column_stack([jacobian @ poses.covariance, *biases])
-        @ np.column_stack([jacobian, *biases]).T
+    covariance = PointCovariance(
+        own_error @ own_error.transpose(0, 2, 1),
+        np.column_stack([jacobian, *biases]),
+        scipy.linalg.block_diag(poses.covariance, np.eye(len(biases))),
     )
-    covariance.reshape(n, 3, n, 3)[indices, :, indices] += own_error @ own_error.transpose(0, 2, 1)
     points = Points(
         names=tuple(f"{name} {row}" for name, row in zip(hits.setup, _rows(hits), strict=True)),
         xyz_m=xyz,

@@ -30,30 +30,17 @@ Source: Cauchy's formula for the perimeter; Santalo 1976, section 1.1.
 from dataclasses import dataclass, field
 
 import numpy as np
-import scipy.linalg
 
 from tankcal.adjust import SD_OVER_MEDIAN
-from tankcal.messages import message
+from tankcal.covariance import PointCovariance
 from tankcal.survey.points import Points
 from tankcal.survey.results import Cause
 from tankcal.survey.sighting import Poses
 from tankcal.units import FULL_TURN
 
-MOST_TANGENTS = 2500  # largest number of tangents with a full covariance matrix
 FEWEST_SETUPS = 3  # smallest number of set-ups of a level, with two sights each
 LEAST_RISE = 0.05  # smallest sine of the zenith angle: a steeper sight touches no wall
 ROUNDS, FAR_SDS = 30, 2.0  # of the robust circle; residuals, in sds, from which weights fall
-
-
-def too_many_tangents(count):
-    """Message about more tangents than can be used."""
-    return message(
-        "too_many_tangents",
-        "{count} tangents; expected at most {most}, for the covariance of each with each is kept,"
-        " four times as much for twice the tangents: take every second one",
-        count=count,
-        most=MOST_TANGENTS,
-    )
 
 
 @dataclass(frozen=True)
@@ -318,14 +305,14 @@ def touch(tangents, poses, *, zero_z_m, nominal_m, tools=(), hull=None):
     causes = _causes(poses, jacobian, tools)
     # The common excess moves all tangents along their normals.
     shared = np.pad(-hull.common_sd_m[:, None] * normal, ((0, 0), (0, 1))).ravel()
-    covariance = scipy.linalg.block_diag(*own_covariance) + jacobian @ poses.covariance @ jacobian.T
+    covariance = PointCovariance(own_covariance, jacobian, poses.covariance)
     # Sights from a set-up to one limb bridge the same valley of the wall: one error each.
     bridged = np.repeat(hull.own_sd_m, 3)[:, None] * _columns_of_limbs(tangents, normal)
-    covariance += bridged @ bridged.T
+    covariance = covariance.add_columns(bridged, np.eye(bridged.shape[1]))
     if hull.common_sd_m.any():
         size_mm = 1e3 * float(hull.common_sd_m.mean())
         causes += (Cause("", "tangent_excess", size_mm, "mm", shared),)
-        covariance += np.outer(shared, shared)
+        covariance = covariance.add_columns(shared[:, None], np.eye(1))
     count, rows = len(tangents), tangents.rows or range(1, len(tangents) + 1)
     points = Points(
         names=tuple(f"{name} {row}" for name, row in zip(tangents.setup, rows, strict=True)),

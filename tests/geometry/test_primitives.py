@@ -10,6 +10,7 @@ from draws import draws
 from jacobians import assert_derivative
 
 from tankcal.errors import SolutionError
+from tankcal.geometry.circles import own_columns
 from tankcal.geometry.cylinders import cylinder_distances, fit_cylinder, lying_cylinder
 from tankcal.geometry.primitives import (
     conditions_of,
@@ -228,7 +229,8 @@ def test_both_jacobians(distances, unknowns, dimensions):
     points = np.random.default_rng(6).normal(0, 2, 12 * dimensions)
     _, by_unknowns, by_points = model(np.array(unknowns), points)
     assert_derivative(lambda x: model(x, points)[0], unknowns, by_unknowns)
-    assert_derivative(lambda l: model(np.array(unknowns), l)[0], points, by_points)
+    of_all = own_columns(by_points).toarray()
+    assert_derivative(lambda l: model(np.array(unknowns), l)[0], points, of_all)
 
 
 def test_distances_to_an_ellipse_by_points_at_known_distances():

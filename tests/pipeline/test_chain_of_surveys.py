@@ -8,6 +8,7 @@ from draws import draws
 from networks import CONTROL_SD_M, photographed, tank_points
 from photographed_jobs import between, by_tape, control_of, measurements, tank_job
 
+from tankcal.covariance import PointCovariance
 from tankcal.errors import InputError, SolutionError
 from tankcal.job.model import DeclaredInput, Sphere
 from tankcal.pipeline.chain import adjust_job, run
@@ -223,7 +224,7 @@ def test_the_common_motion_of_points_is_taken_out(job, survey):
     noise = 1e-6 * np.eye(144)
     moved = replace(points, covariance_m2=noise + 25.0 * motion @ motion.T, causes=(away,))
     left = s_transform(moved)
-    assert left.covariance_m2 == pytest.approx(noise, abs=1e-11)
+    assert left.covariance_m2.dense() == pytest.approx(noise, abs=1e-11)
     assert left.causes[0].column_m == pytest.approx(np.zeros(144), abs=1e-15)
 
 
@@ -249,11 +250,11 @@ def test_points_that_are_not_on_the_wall_are_no_clutter(job, survey):
 def test_a_vague_point_and_a_vague_wall_are_named(job, survey):
     result = run(replace(job, measurements=with_control(survey)))
     points = result.job.points
-    poor = points.covariance_m2.copy()
+    poor = points.covariance_m2.dense()
     poor[15:18, 15:18] += 4e-4 * np.eye(3)
     told = run(replace(job, points=replace(points, covariance_m2=poor, causes=())))
     assert any(f"{points.names[5]} (2" in str(one) for one in told.warnings)
-    poor = points.covariance_m2 + 4e-4 * np.eye(144)
+    poor = points.covariance_m2.dense() + 4e-4 * np.eye(144)
     told = run(replace(job, points=replace(points, covariance_m2=poor, causes=())))
     assert any("cannot be told from noise" in str(one) for one in told.warnings)
 
@@ -263,7 +264,8 @@ def test_weak_vertical_is_reported(job, survey):
     points = run(replace(job, measurements=with_control(survey))).job.points
     x, _, z = (points.xyz_m - points.xyz_m.mean(axis=0)).T
     lean = 0.005 * np.column_stack([z, np.zeros(48), -x]).ravel()
-    leaning = replace(points, covariance_m2=points.covariance_m2 + np.outer(lean, lean), causes=())
+    spread = points.covariance_m2.dense() + np.outer(lean, lean)
+    leaning = replace(points, covariance_m2=spread, causes=())
     told = [str(one) for one in run(replace(job, points=leaning)).warnings]
     assert any("is known only to 5.0 mm/m" in one for one in told)
 
@@ -350,11 +352,12 @@ def true_wall(job, wall):
 
 
 def without_covariance_between_courses(wall):
-    apart = np.zeros_like(wall.covariance_m2)
+    whole = wall.covariance_m2.dense()
+    apart = np.zeros_like(whole)
     for section in wall.sections:
         index = np.ix_(*[coordinates_of(section.group.members)] * 2)
-        apart[index] = wall.covariance_m2[index]
-    return apart
+        apart[index] = whole[index]
+    return PointCovariance.convert(apart, 3)
 
 
 def check_surveys(job, count, figure):

@@ -242,7 +242,7 @@ def dense(result):
     wall, job = result.wall, result.job
     n, field = len(wall.field.radius_m) - len(wall.readings), wall.field
     jacobian = wall.radii_by_points[:n]
-    of_points = (jacobian @ wall.covariance_m2 @ jacobian.T).toarray()
+    of_points = wall.covariance_m2.propagate(jacobian)
     sites, offsets = field.sites, job.lines.offsets
     straps = [one for one in wall.readings if one.of == "straps"]
     k = len(straps)

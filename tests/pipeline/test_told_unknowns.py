@@ -50,7 +50,7 @@ def propagated(wall):
 
     Of (I - D G B) e - D G f, e the errors of the points and f what else the readings have.
     """
-    field, by, own = wall.field, wall.radii_by_points, wall.covariance_m2
+    field, by, own = wall.field, wall.radii_by_points, wall.covariance_m2.dense()
     moved = wall.told.moved_m @ wall.told.by_readings
     kept = np.eye(by.shape[1]) - moved @ by
     other = field.covariance_m2 - by @ (by @ own).T

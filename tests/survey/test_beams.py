@@ -52,7 +52,7 @@ def test_radius_of_independent_shifts(scans, per):
         xyz, np.full(len(xyz), 1e-9), scan, normal, registration, {"S": (EXACT, False, False)}
     )
     by = mean_radius(normal)
-    u = np.sqrt(by @ found.points.covariance_m2 @ by)
+    u = np.sqrt(by @ (found.points.covariance_m2 @ by))
     w = np.pi / scans
     assert u / SD_M == pytest.approx(np.sin(w) / (w * np.sqrt(scans)), rel=1e-3)
     assert u / SD_M == pytest.approx(CLOSED_FORM[scans], abs=6e-4)
@@ -76,7 +76,7 @@ def test_scatter_of_simulated_scans(scans):
         xyz, np.full(len(xyz), 1e-9), scan, normal, registration, {"S": (EXACT, False, False)}
     )
     by = mean_radius(normal)
-    u = np.sqrt(by @ found.points.covariance_m2 @ by)
+    u = np.sqrt(by @ (found.points.covariance_m2 @ by))
     assert u == pytest.approx(np.std(radii), rel=0.05)
     if scans == 4:
         assert u == pytest.approx(9.0e-4, rel=0.02)
@@ -109,7 +109,9 @@ def test_columns_are_what_motions_and_a_scanner_do():
         np.testing.assert_allclose(of_scan[3 + axis], turned, atol=1e-7)
         np.testing.assert_allclose(of_scan[axis][:, axis], np.where(scan == 1, SD_M, 0))
     whole = sum(np.outer(one.column_m, one.column_m) for one in found.points.causes)
-    np.testing.assert_allclose(found.points.covariance_m2, whole + 1e-6 * np.eye(42), atol=1e-18)
+    np.testing.assert_allclose(
+        found.points.covariance_m2.dense(), whole + 1e-6 * np.eye(42), atol=1e-18
+    )
     assert [one.is_assumed for one in found.points.causes if one.what == "instrument_scale"] == [
         True
     ]

@@ -47,12 +47,11 @@ from tankcal.pipeline.wall.surveyed import (
 )
 from tankcal.pipeline.wall_straps import PointsOfWall, join_readings, told_courses
 from tankcal.sections import (
+    LEAST_SD_M,
     coordinates_of,
-    covariance_of,
     fit_section,
     group_by_height,
     group_by_name,
-    own_covariances,
     sample_of,
 )
 from tankcal.solver.compiled import threads_for
@@ -146,7 +145,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
     # Undecided columns enter midway between the wall with and without them.
     undecided = means @ undecided_halves(shell, accepted, groups)
     radius = means @ np.concatenate([sample.radius_m for sample in samples]) - undecided.sum(axis=1)
-    noise = (means @ scipy.sparse.block_diag(_blocks(samples)) @ means.T).toarray()
+    noise = _noise_of_sections(samples, means)
     is_known = amplitudes is not None
     amplitudes = amplitudes if is_known else sizes
     if amplitudes is None:
@@ -164,7 +163,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
         # Free set-ups absorb waves as numerous as themselves, so that the readings show too little
         # of the common form: its prior median is the lower bound.
         amplitudes = amplitudes.raise_to_median("common ovality")
-    if amplitudes.noise != 1.0:  # avoid a copy of up to half a gigabyte
+    if amplitudes.noise != 1.0:
         covariance = covariance * amplitudes.noise
         noise *= amplitudes.noise
         to_fit = _to_fit(job, shell, accepted, groups, covariance)
@@ -177,8 +176,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
     )
     if is_read or job.points.unbound or by_inputs or _is_smooth(job):
         unbound = unbound_of(job.points, by_points, accepted)
-        noise = by_points @ (covariance @ by_points.T)  # includes covariances between sections
-        noise = noise.toarray() if scipy.sparse.issparse(noise) else noise
+        noise = covariance.propagate(by_points)  # includes covariances between sections
     if not is_read:
         first_apart = unbound.first_apart if job.points.unbound else None
         sites = unbound.shared_by(sites) if job.points.unbound else sites
@@ -311,19 +309,20 @@ def _sites(groups, samples, nominal_m, of_wall):
     )
     if len(sites) <= MOST_SITES:
         return sites, scipy.sparse.eye_array(len(sites), format="csr")
-    variances = np.concatenate([block.diagonal() for block in _blocks(samples)])
+    variances = np.concatenate([sample.covariance_m2.diagonal() for sample in samples])
     means = cells_of(sites, variances, nominal_m)
     return sites_of_cells(sites, means), means
 
 
-def _blocks(samples):
-    """Covariance of the radii of each sample, m2."""
-    return [
-        scipy.sparse.diags_array(sample.covariance_m2)
-        if np.ndim(sample.covariance_m2) == 1
-        else sample.covariance_m2
-        for sample in samples
-    ]
+def _noise_of_sections(samples, means):
+    """Covariance (sites, sites) of the means of radii, m2, without that between sections."""
+    noise, start = np.zeros((means.shape[0],) * 2), 0
+    for sample in samples:
+        of_section = means[:, start : start + len(sample.radius_m)].tocsr()
+        sites = np.flatnonzero(np.diff(of_section.indptr))
+        noise[np.ix_(sites, sites)] = sample.covariance_m2.propagate(of_section[sites])
+        start += len(sample.radius_m)
+    return noise
 
 
 def _form_m2(amplitudes):
@@ -461,14 +460,12 @@ def _azimuths(job, shell, wall):
 
 def _to_fit(job, shell, accepted, groups, covariance):
     """Arguments of `fit_section`, except the form, for each group."""
-    xyz, covariances = job.points.xyz_m[accepted], own_covariances(covariance)
+    xyz = job.points.xyz_m[accepted]
     return [
         (
             group,
             xyz[group.members],
-            covariance_of(group.members, covariance)
-            if covariances is None
-            else covariances[group.members],
+            covariance.take(group.members).definite(LEAST_SD_M),
             shell.slope,
             job.datum.bottom_z_m + group.height_m,
         )
@@ -481,8 +478,6 @@ def _to_fit(job, shell, accepted, groups, covariance):
 
 def take_points(points, chosen):
     """Return selected points (k,), with their covariance and their causes."""
-    if np.array_equal(chosen, np.arange(len(points.names))):  # the covariance may be large
-        return points
     index = coordinates_of(chosen)
 
     def select(values):
@@ -495,7 +490,7 @@ def take_points(points, chosen):
         points,
         names=select(points.names),
         xyz_m=points.xyz_m[chosen],
-        covariance_m2=points.covariance_m2[np.ix_(index, index)],
+        covariance_m2=points.covariance_m2.take(chosen),
         section=select(points.section),
         generatrix=select(points.generatrix),
         rows=select(points.rows),

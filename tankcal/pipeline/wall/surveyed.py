@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse
 
+from tankcal.covariance import PointCovariance
 from tankcal.geometry.field.estimate import WallField
 from tankcal.geometry.field.section_noise import noise_of_sections
 from tankcal.geometry.shell import UNDECIDED, Shell
@@ -133,7 +134,7 @@ class Wall:
         Heights of the joints above the bottom, along the vertical, m.
     accepted : ndarray, shape (m,)
         Indices of the accepted points in job.points.
-    covariance_m2 : ndarray, sparse array or `PredictedCovariance`, shape (3 m, 3 m)
+    covariance_m2 : PointCovariance
         Covariance of the accepted points, m2.
     noise_dof : float
         Degrees of freedom of the scale of that covariance.
@@ -199,8 +200,7 @@ class Wall:
         -------
         ndarray, shape (r, r)
         """
-        index = coordinates_of(members)
-        covariance = by_points @ (self.covariance_m2[index][:, index] @ by_points.T)
+        covariance = self.covariance_m2.take(members).propagate(by_points)
         return (
             covariance
             if self.told is None
@@ -209,10 +209,7 @@ class Wall:
 
     def point_covariances_m2(self):
         """Covariance (m, 3, 3) of the coordinates of each accepted point, m2; see `spread_of`."""
-        covariances = np.empty((len(self.accepted), 3, 3))
-        for row, column in np.ndindex(3, 3):
-            along = self.covariance_m2.diagonal(column - row)
-            covariances[:, row, column] = along[min(row, column) :: 3][: len(covariances)]
+        covariances = self.covariance_m2.point_blocks
         return covariances if self.told is None else covariances + self.told.spread_alone()
 
     def factors(self, job, weights):
@@ -243,25 +240,15 @@ class Wall:
             return tuple(
                 reading.mapped(lambda columns: weights @ columns) for reading in of_readings
             )
-        covariance, index = self._covariance_of(weights), coordinates_of(self.accepted)
+        covariance = weights @ self.points_m2 @ weights.T
+        index = coordinates_of(self.accepted)
         effects = [weights @ (self.radii_by_points @ cause.column_m[index]) for cause in causes]
         return survey_factors(covariance, self.noise_dof, causes, effects)
-
-    def _covariance_of(self, weights):
-        """Covariance (f, f) of features due to the points.
-
-        The covariance of a plan with many points is applied to few columns and never formed.
-        """
-        if isinstance(self.covariance_m2, np.ndarray) or scipy.sparse.issparse(self.covariance_m2):
-            return weights @ self.points_m2 @ weights.T
-        by_points = weights @ self.radii_by_points
-        return by_points @ (self.covariance_m2 @ by_points.T)
 
     @cached_property
     def points_m2(self):
         """Covariance (n, n) of the readings due to the points, also between sections, m2."""
-        covariance = self.radii_by_points @ (self.radii_by_points @ self.covariance_m2).T
-        return covariance.toarray() if scipy.sparse.issparse(covariance) else covariance
+        return self.covariance_m2.propagate(self.radii_by_points)
 
     def read_with(self, weights):
         """Derivatives (f,) of features by inputs on which points and readings depend.
@@ -307,21 +294,24 @@ def s_transform(points):
     Parameters
     ----------
     points : Points
-        n points with covariance_m2 (3n, 3n), m2.
+        n points with a `PointCovariance`, m2.
 
     Returns
     -------
     Points
         With C', and with the columns of their causes projected by S.
     """
-    basis, covariance = common_motions(points.xyz_m), points.covariance_m2
-    across = s_transform_factors(basis, covariance @ basis, np.trace(covariance))
-    change = np.hstack([basis, across]) @ np.hstack([across, basis]).T
+    basis = common_motions(points.xyz_m)
+    covariance = PointCovariance.convert(points.covariance_m2, 3)
+    across = s_transform_factors(basis, covariance @ basis, covariance.diagonal().sum())
+    # C' = C - D A' - A D': the columns D and A, and what joins them.
+    joint = -np.kron([[0, 1], [1, 0]], np.eye(4))
+    covariance = covariance.add_columns(np.hstack([basis, across]), joint)
     causes = tuple(
         replace(cause, column_m=cause.column_m - basis @ (basis.T @ cause.column_m))
         for cause in points.causes
     )
-    return replace(points, covariance_m2=np.subtract(covariance, change, out=change), causes=causes)
+    return replace(points, covariance_m2=covariance, causes=causes)
 
 
 def common_motions(xyz_m):
@@ -399,10 +389,8 @@ def median_sd(sds):
 
 
 def given_covariance(points, wall):
-    """Covariance (3m, 3m) from the file, m2; 1 m for each coordinate if the file gives none."""
+    """`PointCovariance` of points (m,), m2; 1 m for each coordinate if the file gives none."""
     if points.covariance_m2 is not None:
-        index = coordinates_of(wall)
-        return points.covariance_m2[np.ix_(index, index)]
-    if points.sd_m is not None:
-        return scipy.sparse.diags_array(points.sd_m[wall].ravel() ** 2).tocsr()
-    return scipy.sparse.eye_array(3 * len(wall), format="csr")
+        return PointCovariance.convert(points.covariance_m2, 3).take(wall)
+    sd = np.ones((len(wall), 3)) if points.sd_m is None else points.sd_m[wall]
+    return PointCovariance.convert(sd.ravel() ** 2, 3)

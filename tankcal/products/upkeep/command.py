@@ -71,7 +71,7 @@ def _upkeep(options):
     prepare_for_small_work()
     speak(options.language)
     if options.new:
-        from tankcal.products.upkeep.starter import write_starter
+        from tankcal.products.upkeep.reading import write_starter
 
         print_paths(options.folder, write_starter(options.folder, language_of_run()))
         return

@@ -373,6 +373,11 @@ class Adjusted:
             (columns if points is None else columns[np.asarray(points, int)]).ravel()
         )
 
+    def covariance_of_points(self, points):
+        """`PointCovariance` of points by number; exact, see `solver.Cofactors.point_covariance`."""
+        columns = self.problem.layout.points[np.asarray(points, dtype=int)]
+        return self.solution.cofactor.point_covariance(columns)
+
     def joint_covariance(self, points, **nuisances):
         """Covariance of points and of shared unknowns; 0 for fixed ones.
 
