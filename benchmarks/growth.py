@@ -242,7 +242,7 @@ CASES = {  # what: task, what its sizes count, sizes that always run, large ones
     "run of photos": (run_of_photos, "photos", *PHOTOS),
     "run of hits": (run_of_hits, "hits", (250, 500), (1000, 2500)),
 }
-DENSE = ("adjustment", "run of photos", "run of hits")
+DENSE = ("adjustment", "run of photos")
 
 
 def main(chosen):

@@ -10,6 +10,8 @@ from tankcal.geometry.circles import taubin_circle
 from tankcal.messages import message
 from tankcal.survey.results import Cause
 
+LARGEST = 2500  # points of an adjusted survey that were verified
+
 
 @dataclass(frozen=True)
 class Points:
@@ -81,7 +83,7 @@ def wall_points(adjustment, measurements, side):
     Raises
     ------
     SolutionError
-        If no point remains.
+        If no point or too many points remain.
     """
     targets = measurements.targets
     place = {name: i for i, name in enumerate(adjustment.names)}
@@ -91,13 +93,7 @@ def wall_points(adjustment, measurements, side):
         stations = {cause.station for cause in measurements.setups}
         rows = dict.fromkeys((name for name in place if name not in stations), None)
     names = tuple(rows)
-    if not names:
-        raise SolutionError(
-            message(
-                "no_target_adjusted",
-                "no target of targets.csv was adjusted: no point is left for the wall",
-            )
-        )
+    _refuse_size(len(names))
     indices = np.array([place[name] for name in names])
     xyz = adjustment.xyz_m[indices]
     section = generatrix = numbers = (None,) * len(names)
@@ -161,3 +157,24 @@ def move_to_wall(xyz_m, outwards_m):
     moved = xyz_m.copy()
     moved[:, :2] -= outwards_m[:, None] * normal
     return moved
+
+
+def _refuse_size(n):
+    """Raise SolutionError if a wall has no point, or more points than were verified."""
+    if not n:
+        raise SolutionError(
+            message(
+                "no_target_adjusted",
+                "no target of targets.csv was adjusted: no point is left for the wall",
+            )
+        )
+    if n > LARGEST:
+        raise SolutionError(
+            message(
+                "wall_too_large",
+                "{n} points of the wall were adjusted; expected at most {largest}, the largest"
+                " number that was verified: name the targets to use in targets.csv",
+                n=n,
+                largest=LARGEST,
+            )
+        )

@@ -33,14 +33,27 @@ import numpy as np
 
 from tankcal.adjust import SD_OVER_MEDIAN
 from tankcal.covariance import PointCovariance
+from tankcal.messages import message
 from tankcal.survey.points import Points
 from tankcal.survey.results import Cause
 from tankcal.survey.sighting import Poses
 from tankcal.units import FULL_TURN
 
+MOST_TANGENTS = 2500  # largest number that was verified
 FEWEST_SETUPS = 3  # smallest number of set-ups of a level, with two sights each
 LEAST_RISE = 0.05  # smallest sine of the zenith angle: a steeper sight touches no wall
 ROUNDS, FAR_SDS = 30, 2.0  # of the robust circle; residuals, in sds, from which weights fall
+
+
+def too_many_tangents(count):
+    """Message about more tangents than can be used."""
+    return message(
+        "too_many_tangents",
+        "{count} tangents; expected at most {most}, the largest number that was"
+        " verified: take every second one",
+        count=count,
+        most=MOST_TANGENTS,
+    )
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,21 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tankcal.messages import message
+
+MOST_HITS = 2500  # largest number that was verified, see docs/studies/sizes.md
 FEWEST_HITS = 5  # smallest number of hits of a section of the wall
+
+
+def too_many_hits(count):
+    """Message about more hits than can be used."""
+    return message(
+        "too_many_hits",
+        "{count} hits; expected at most {most}, the largest number that was verified: take every"
+        " second one or hand them in as points.csv",
+        count=count,
+        most=MOST_HITS,
+    )
 
 
 @dataclass(frozen=True)

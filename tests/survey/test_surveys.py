@@ -356,6 +356,14 @@ def test_points_of_the_wall(photos, adjustment):
         )
 
 
+def test_too_many_points_of_the_wall_are_refused(photos, adjustment, monkeypatch):
+    monkeypatch.setattr("tankcal.survey.points.LARGEST", 20)
+    with pytest.raises(
+        SolutionError, match="48 points of the wall were adjusted; expected at most 20"
+    ):
+        wall_points(adjustment, photos[0], "outside")
+
+
 def test_stations_are_not_of_the_wall():
     measurements, _ = by_instruments()
     points = wall_points(adjust_survey(measurements), measurements, "outside")

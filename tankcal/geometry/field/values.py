@@ -74,12 +74,10 @@ class FieldValues:
         factor, by_columns, normal = field._factors
         free, explained = field._solution
         design = self._design(centres)
-        self._across = [self._site_covariances(index) for index in range(len(COMPONENTS))]
-        stated = [one.shape in field.stated for one in COMPONENTS]
         covariance = np.zeros((len(design), len(field.sites)))
-        for part, included in zip(self._across, stated, strict=True):
-            if included:
-                covariance[: len(spots)] += part
+        for index, component in enumerate(COMPONENTS):
+            if component.shape in field.stated:
+                covariance[: len(spots)] += self._site_covariances(index)
         # g = X_g beta + K_g V^-1 (y - X beta), plus the subtracted mean radius of the course.
         self.value_m = design @ free + covariance @ explained
         self.value_m[: len(spots)] += field._mean_m[spots.course]
@@ -117,14 +115,16 @@ class FieldValues:
             Variances of the errors, m2.
         """
         weights, of_places = rows @ self.weights, rows[:, : len(self._spots)]
+        places = np.unique(of_places.indices)
         row, first, second, product = _enumerate_pairs(of_places)
         correlations = self._correlate_places(first, second)
         variances = np.empty((len(COMPONENTS), len(weights)))
         sizes = self._field.amplitudes.variances_m2
-        for index, (size, covariance) in enumerate(zip(sizes, self._across, strict=True)):
+        for index, size in enumerate(sizes):
+            covariance = of_places[:, places] @ self._site_covariances(index, places)
             # Diagonal of A K A' - 2 K_g A' + K_gg, term by term.
             variances[index] = size * self._covariances.spread_alone(weights, index)
-            variances[index] -= 2 * np.einsum("rn,rn->r", weights, of_places @ covariance)
+            variances[index] -= 2 * np.einsum("rn,rn->r", weights, covariance)
             prior_variance = (
                 size * product * self._pair_covariances(index, first, second, correlations)
             )
@@ -153,17 +153,17 @@ class FieldValues:
                 column += 4 if leans else 2
         return derivative
 
-    def _site_covariances(self, index):
-        """Return the covariance (p, n) of the places with a component at the sites, m2."""
+    def _site_covariances(self, index, places=slice(None)):
+        """Return the covariance (p, n) of places with a component at the sites, m2."""
         component, spots, sites = COMPONENTS[index], self._spots, self._field.sites
         size = self._field.amplitudes.variances_m2[index]
         if component.shape == "weld":
-            return size * self._peaks[index] @ self._covariances.peaks[index].T
-        covariance = self._along[component.shape] * component.height_covariance(
-            self._heights, sites.heights
+            return size * self._peaks[index][places] @ self._covariances.peaks[index].T
+        covariance = self._along[component.shape][places] * component.height_covariance(
+            self._heights[places], sites.heights
         )
         if not component.common:
-            covariance = covariance * (spots.course[:, None] == sites.course)
+            covariance = covariance * (spots.course[places, None] == sites.course)
         return size * covariance
 
     def _correlate_places(self, first, second):

@@ -14,9 +14,11 @@ from tankcal.job.structure import angle_in_rad
 from tankcal.messages import message
 from tankcal.survey.wall_hits import (
     FEWEST_HITS,
+    MOST_HITS,
     ControlReading,
     RangingInstrument,
     WallHits,
+    too_many_hits,
 )
 from tankcal.units import ARCSEC
 
@@ -36,6 +38,9 @@ def check_hits(values, tables, registers, raw, log, *, undeclared_offset=None):
         if has_rows(control):
             expected = message("no_hits", "without effect: the job has no wall hits")
             log.warning(control.file, expected)
+        return
+    if len(hits.rows) > MOST_HITS:
+        log.problem(hits.file, too_many_hits(len(hits.rows)))
         return
     count = sum(use != "check" for use in hits.of("use"))
     if count < FEWEST_HITS and not hits.skipped:

@@ -10,13 +10,16 @@ from tankcal.job.checks.tapes import check_levels, refuse_others
 from tankcal.job.measuring import setups_of
 from tankcal.job.structure import angle_in_rad
 from tankcal.messages import message
-from tankcal.survey.tangents import FEWEST_SETUPS, Tangents
+from tankcal.survey.tangents import FEWEST_SETUPS, MOST_TANGENTS, Tangents, too_many_tangents
 from tankcal.units import ARCSEC
 
 
 def check_tangents(values, tables, registers, raw, log):
     """Check sights to both limbs from a network of set-ups outside; as for `Method.check`."""
     table = tables["tangents"]
+    if len(table.rows) > MOST_TANGENTS:
+        log.problem(table.file, too_many_tangents(len(table.rows)))
+        return
     for name in ("points", "targets", "wall_hits"):
         if has_rows(tables[name]):
             expected = message(

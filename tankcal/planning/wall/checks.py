@@ -19,8 +19,8 @@ from tankcal.planning.wall.filling import check_runs
 from tankcal.planning.wall.model import USUAL_AT, even_radius_m, evenness_of_limbs
 from tankcal.survey.reference_line import MOST_OFFSETS, too_many_offsets
 from tankcal.survey.strapping import MOST_STRAPS, too_many_straps
-from tankcal.survey.tangents import FEWEST_SETUPS
-from tankcal.survey.wall_hits import FEWEST_HITS
+from tankcal.survey.tangents import FEWEST_SETUPS, MOST_TANGENTS, too_many_tangents
+from tankcal.survey.wall_hits import FEWEST_HITS, MOST_HITS, too_many_hits
 
 CLEAR_M, MOST_SECTIONS = 0.5, 50
 LIMBS = ("left", "right")
@@ -120,6 +120,8 @@ def _check_hits(rings, courses, log):
             azimuths=FEWEST_AZIMUTHS,
         )
         ring.report(log.problem, "hits", expected)
+    if total > MOST_HITS:
+        log.problem(PLAN_FILE, too_many_hits(total), None, "hits")
 
 
 def _check_lines_and_ties(plan_input, log):
@@ -254,11 +256,15 @@ def _check_totals(plan_input, courses, log):
     )
     if straps > MOST_STRAPS:
         log.problem(PLAN_FILE, too_many_straps(straps), None, "straps")
-    lines = plan_input.sections["lines"]
+    lines, ring = plan_input.sections["lines"], plan_input.sections["tangents"]
     levels = len(courses) * len(percents_of(lines))
     offsets = int((lines["count"] or 0) * (lines["faces"] or 2) * (lines["readings"] or 1)) * levels
     if lines.filled_keys and offsets > MOST_OFFSETS:
         log.problem(PLAN_FILE, too_many_offsets(offsets), lines.row, "lines")
+    levels = len(courses) * len(percents_of(ring))
+    tangents = int((ring["stations"] or 0) * (ring["readings"] or 1)) * levels * len(LIMBS)
+    if ring.filled_keys and tangents > MOST_TANGENTS:
+        log.problem(PLAN_FILE, too_many_tangents(tangents), ring.row, "tangents")
 
 
 def percents_of(entry):

@@ -14,6 +14,8 @@ from tankcal.planning.wall.filling import rows_of_runs
 from tankcal.survey.reference_line import MOST_OFFSETS
 from tankcal.survey.stadia import angle_of_distance_rad
 from tankcal.survey.strapping import MOST_STRAPS
+from tankcal.survey.tangents import MOST_TANGENTS
+from tankcal.survey.wall_hits import MOST_HITS
 from tankcal.tank.liquid.reduction import MOST_ROWS
 
 OFF_WALL_M = 0.2  # distance of a reference line from the wall
@@ -59,18 +61,18 @@ class DesignTables:
 
     def tables(self):
         """Return {name: Table}, with decimal points."""
-        parts = {  # part of the design: its tables, and the most rows of each, or None
+        parts = {  # part of the design: its tables, and the most rows of each
             "straps": (lambda: {"circumferences": self._straps()}, MOST_STRAPS),
             "lines": (lambda: {"lines": self._lines(), "offsets": self._offsets()}, MOST_OFFSETS),
-            "hits": (self._tables_of_hits, None),
-            "tangents": (lambda: {"tangents": self._tangents()} | self._traverse(), None),
+            "hits": (self._tables_of_hits, MOST_HITS),
+            "tangents": (lambda: {"tangents": self._tangents()} | self._traverse(), MOST_TANGENTS),
             "runs": (
                 lambda: {"liquid": rows_of_runs(self.design.runs, self.volume_at)},
                 MOST_ROWS,
             ),
         }
         return {
-            name: _table(name, islice(rows, most and most + 1))
+            name: _table(name, islice(rows, most + 1))
             for part, (make_tables, most) in parts.items()
             if getattr(self.design, part)
             for name, rows in make_tables().items()

@@ -24,6 +24,7 @@ from tankcal.products.fieldbooks.rows import (
     sort_readings,
 )
 from tankcal.products.fieldbooks.writing import write_tables
+from tankcal.survey.wall_hits import MOST_HITS
 from tankcal.units import ARCSEC_PER_DEG
 
 SAME_M = 0.001  # tolerance of repeated coordinates of one point
@@ -567,6 +568,15 @@ def collect_warnings(chosen, names, setups, reports):
                 limit_mm=1000 * LARGE_M,
             )
             problems.append(Problem(file, text))
+    if len(chosen.hits) > MOST_HITS:
+        shot = chosen.hits[0].shot
+        text = message(
+            "more_hits_than_a_job_takes",
+            "{count} hits, but a job allows at most {most}; leave some out with --leave",
+            count=len(chosen.hits),
+            most=MOST_HITS,
+        )
+        problems.append(Problem(shot.file, text, shot.row))
     problems += _check_constants(chosen)
     if chosen.ties:
         text = message(
