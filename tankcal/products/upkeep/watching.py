@@ -47,6 +47,7 @@ LEAST_DAYS = 2.0  # of data after a beginning, before a cause is tested
 DRAWS, SEED = 600, 20250106
 OVERLAP_S = 91 * DAY_S  # of a window with the period before
 MOST_JUMPS = 20  # steps with the largest innovations, in which a jump is tested
+JUMP_STEPS = 8  # steps in which a jump shows, for its limit
 MOST_SUSPECTS = 8  # of which the beginnings are refined
 UNLIKELY = 12.0  # less in w^2 than the best beginning: a weight of 0.0025
 MOST_BEGINNINGS = 150  # refined beginnings of a suspect
@@ -222,7 +223,9 @@ def _watch_window(estimation, begin, first, last, rate):
     w = _sums(effects * innovations[:, None], edges) / root
     share = 1 - min(rate * days / 365.25, 0.5)
     rng = np.random.default_rng(SEED)
-    by_model = _largest(effects, root, edges, rng.normal(size=(DRAWS, len(end))) * is_used)
+    kernels = _find_kernels(trials, effects, seconds[begin + 1 :])
+    by_model = _largest(effects, root, edges, kernels,
+                        rng.normal(size=(DRAWS, len(end))) * is_used)  # fmt: skip
     limit = limit_of_model = float(np.quantile(by_model, share))
     limit_of_tank, false_alarms, size_of = None, None, np.abs(w).max(axis=1)
     # The innovations of all periods are drawn. A fault must not raise its limit: after a |w| that
@@ -234,7 +237,7 @@ def _watch_window(estimation, begin, first, last, rate):
         pool = pool[: begin + (edges[day - 1] if day else 0)]
     if seconds[len(pool)] >= LEAST_TANK_DAYS * DAY_S:
         blocks = _draw_blocks(pool, seconds, len(end), rng, DRAWS)
-        by_tank = _largest(effects, root, edges, blocks)
+        by_tank = _largest(effects, root, edges, kernels, blocks)
         limit_of_tank = float(np.quantile(by_tank, share))
         limit = max(limit, limit_of_tank)
         false_alarms = float(np.mean(by_tank > limit))
@@ -329,7 +332,25 @@ def _sums(values, edges):
     return np.cumsum(values, axis=0)[edges - 1]
 
 
-def _largest(effects, root, edges, draws):
+def _find_kernels(trials, effects, end):
+    """Mean effects of jumps on their own step and the steps after it, a unit vector per kind."""
+    kernels = []
+    for kind in JUMPS:
+        columns = [
+            effects[step : step + JUMP_STEPS, place]
+            for place, (cause, at) in enumerate(trials)
+            if cause.kind == kind
+            for step in [int(np.searchsorted(end, at))]
+            if step + JUMP_STEPS <= len(effects) and effects[step, place] != 0
+        ]
+        if columns:
+            mean = np.sum([column / (column[0] * np.linalg.norm(column / column[0]))
+                           for column in columns], axis=0)  # fmt: skip
+            kernels.append(mean / np.linalg.norm(mean))
+    return kernels
+
+
+def _largest(effects, root, edges, kernels, draws):
     """Largest |w| (d,) over days and causes for innovations (d, n)."""
     # Single precision halves the time, and is far below the scatter of the draws.
     effects, scale, draws = (values.astype(np.float32) for values in (effects, 1 / root, draws))
@@ -347,8 +368,15 @@ def _largest(effects, root, edges, draws):
             np.multiply(total[:, :tested], scale[row, :tested], out=scaled[:, :tested])
             np.maximum(largest, scaled[:, :tested].max(axis=1), out=largest)
             np.maximum(largest, -scaled[:, :tested].min(axis=1), out=largest)
-    # A jump is searched in the step with the largest innovation.
-    return np.maximum(largest, np.max(np.abs(draws), axis=1, initial=0.0)).astype(float)
+    # A jump is searched in the steps with the largest innovations of this draw. It shows in its own
+    # step, and more clearly with the steps after it.
+    largest = np.maximum(largest, np.max(np.abs(draws), axis=1, initial=0.0))
+    count = draws.shape[1] - JUMP_STEPS + 1
+    for kernel in kernels:
+        jump = sum(share * draws[:, lag : lag + count]
+                   for lag, share in enumerate(kernel.astype(np.float32)))  # fmt: skip
+        largest = np.maximum(largest, np.max(np.abs(jump), axis=1, initial=0.0))
+    return largest.astype(float)
 
 
 def _draw_blocks(pool, seconds, count, rng, draws):
