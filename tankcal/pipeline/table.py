@@ -196,8 +196,10 @@ def _check_survey(job, survey, top_m):
         from tankcal.pipeline.wall.finding import warnings_of
 
         problems = (*warnings_of(job, survey), *check_wall(job, survey))
-    else:
+    elif survey.surveyed_as == "scan":
         return check_scan(job, survey, top_m)
+    else:  # a nominal wall
+        return check_reference(job, top_m)
     for other in accompanying_methods(job):
         if other is not method:
             problems = (*problems, *other.warnings(job, survey))
