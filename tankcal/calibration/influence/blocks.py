@@ -444,7 +444,7 @@ def _select_points(points, names):
         points,
         names=tuple(points.names[i] for i in rows),
         xyz_m=points.xyz_m[rows],
-        covariance_m2=points.covariance_m2[np.ix_(columns, columns)],
+        covariance_m2=points.covariance_m2.take(rows),
         section=tuple(points.section[i] for i in rows),
         generatrix=tuple(points.generatrix[i] for i in rows),
         rows=tuple(points.rows[i] for i in rows),

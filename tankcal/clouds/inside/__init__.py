@@ -314,7 +314,7 @@ def _fit_round_slab(xy):
     if best < max(ROUND * len(xy), FEWEST / 2):
         return None
     try:
-        circle = fit_circle(xy[chosen], scipy.sparse.eye_array(2 * best, format="csr"))
+        circle = fit_circle(xy[chosen], np.ones(2 * best))
     except SolutionError:
         return None
     # The arc is the full turn less the largest gap between azimuths.
