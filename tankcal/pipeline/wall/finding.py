@@ -57,6 +57,8 @@ from tankcal.sections import (
 from tankcal.solver.compiled import threads_for
 from tankcal.units import FULL_TURN
 
+LEVEL = 3.0  # rms scatter of heights in level rings, in sds of radii, up to which they are equal
+
 
 def find_wall(job, progress, dof=np.inf, amplitudes=None, *, sizes=None):
     """Separate the wall from clutter, and fit axis, field and sections to the points of a job.
@@ -141,7 +143,8 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
     samples = [sample_of(*section) for section in to_fit]
     of_wall = {"welds_rad": _welds(job), "spans": spans_of(joints), "smoothed": is_smoothed(job)}
     # Many points are averaged in cells; `means` are the weights, the identity for few points.
-    sites, means = _sites(groups, samples, nominal, of_wall)
+    zeta = _heights_of(groups, samples, np.diff(joints) / 2)
+    sites, means = _sites(groups, samples, zeta, nominal, of_wall)
     # Undecided columns enter midway between the wall with and without them.
     undecided = means @ undecided_halves(shell, accepted, groups)
     radius = means @ np.concatenate([sample.radius_m for sample in samples]) - undecided.sum(axis=1)
@@ -281,13 +284,34 @@ def _welds(job):
     return welds if any(map(len, welds)) else ()
 
 
-def _sites(groups, samples, nominal_m, of_wall):
+def _heights_of(groups, samples, half_m):
+    """Heights of the points of each section within their course, -1 to +1.
+
+    The error of a steep distance moves height and radius of a point together. If the heights in
+    level rings differ by little more than their errors, the field would take this for a slope of
+    the wall. Such rings therefore count at their mean heights.
+
+    half_m  half the height of each course, m
+    """
+    zeta = [sample.zeta for sample in samples]
+    level = [number for number, group in enumerate(groups) if group.degree == 0]
+    scatter = [half_m[groups[number].course] ** 2 * np.var(zeta[number]) for number in level]
+    noise = [np.median(samples[number].covariance_m2.diagonal()) for number in level]
+    if level and np.mean(scatter) <= LEVEL**2 * np.mean(noise):
+        for number in level:
+            zeta[number] = np.full(len(zeta[number]), np.mean(zeta[number]))
+    return zeta
+
+
+def _sites(groups, samples, zeta, nominal_m, of_wall):
     """`Sites` of the field, with one point or a cell of points per site, and weights of the points.
 
     Parameters
     ----------
     groups : sequence of Group
     samples : sequence of Sample
+    zeta : sequence of ndarray
+        Heights of the points of each sample within their course, -1 to +1.
     nominal_m : float
         Nominal radius, m.
     of_wall : dict
@@ -302,7 +326,7 @@ def _sites(groups, samples, nominal_m, of_wall):
     sites = Sites(
         course=np.repeat([group.course for group in groups], counts),
         ring=np.repeat(np.arange(len(groups)), counts),
-        zeta=np.concatenate([sample.zeta for sample in samples]),
+        zeta=np.concatenate(zeta),
         azimuth_rad=np.concatenate([sample.azimuth_rad for sample in samples]),
         leans=np.repeat([group.degree > 0 for group in groups], counts),
         **of_wall,
