@@ -9,7 +9,7 @@ import numpy as np
 
 from tankcal.messages import message
 
-MOST_HITS = 2500  # largest number that was verified, see docs/studies/sizes.md
+MOST_HITS = 25_000  # largest number that was verified, see docs/studies/sizes.md
 FEWEST_HITS = 5  # smallest number of hits of a section of the wall
 
 

@@ -4,13 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from job_builder import write_folder
-from test_hit_wall import FOOT, LEVELS, SLOPE, STATION, oval, parts_of, volume_of
+from generated_hits import Surface, rows_of, take_hits
+from job_builder import hit_parts, write_folder
+from test_hit_wall import FOOT, LEVELS, NOISY, SLOPE, STATION, oval, parts_of, volume_of
 
 import tankcal
+from tankcal.methods.hits.wall import find_hit_wall
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall.finding import find_wall
 from tankcal.survey.points import Points
+from tankcal.survey.wall_hits import MOST_HITS
+from tankcal.uncertainty import combine
 
 NOISE_M, SCATTER_M = 1e-3, 0.5e-3  # of distances; of true heights about the level of a ring
 
@@ -48,3 +52,19 @@ def test_steep_errors_are_no_slope_of_the_wall(hit_job, count):  # truth: the ge
     volume = body.rows(np.array([body.highest_m]))[0][-1]
     # 2400 readings of 1 mm: 0.02 mm of the mean radius, 0.007 m3
     assert volume == pytest.approx(volume_of(oval), abs=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scatter_m", [0.0, 0.02])
+def test_as_many_hits_as_are_accepted(tmp_path, scatter_m):  # truth: the generated wall
+    count, rng = MOST_HITS // len(LEVELS), np.random.default_rng(5)
+    heights = np.repeat(LEVELS, count) + scatter_m * rng.normal(size=MOST_HITS)
+    azimuth = np.tile(np.arange(count) * 2 * np.pi / count, len(LEVELS))
+    aims = Surface(oval, FOOT, SLOPE).at(azimuth, heights)
+    hits = take_hits(Surface(oval, FOOT, SLOPE), STATION, aims, NOISY, rng)
+    job = tankcal.load(write_folder(tmp_path, hit_parts(rows_of("I", hits))))
+    job, _, wall = find_hit_wall(job, None, lambda text: None)
+    body = body_of(job, wall)
+    top = np.array([body.highest_m])
+    error = body.rows(top)[0][-1] - volume_of(oval)
+    assert abs(error) < combine(body.sources(top), 1).u[0]

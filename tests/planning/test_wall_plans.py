@@ -448,7 +448,7 @@ def test_side_that_no_set_up_is_on_is_told_of_the_plan(tmp_path):
 CONTROL = "[control_targets]\nevery_min = 45\n[limits]"
 TOLD = [  # of a plan, what is changed in it, the whole line in the column
     (HITS, "hits = 20 ", "hits = 2 ", "hits[1].hits: found 2; expected 3 or more"),
-    (HITS, "hits = 20 ", "hits = 400 ", "hits: 4000 hits; expected at most 2500"),
+    (HITS, "hits = 20 ", "hits = 600 ", "expected a whole number from 1 to 500"),
     (LINES, "at_percent = [20]", "at_percent = [180]", "such as 20; 80 (in"),
     (TANGENTS, "radius_m = 12.5", "radius_m = 6.6", "expected 7.11 m or more: the lines between 8"),
     (TANGENTS, "stations = 8", "stations = 60\nreadings = 20", "24000 tangents; expected at most"),
