@@ -8,8 +8,8 @@ meters, tickets and temperatures have errors that are not the model of tankcal. 
 of the time on, the tank of the station loses 0.6 L/h. truth.json has the true values.
 """
 
+import argparse
 import json
-import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -312,11 +312,16 @@ def make_upright(record, folder, days=365):
 
 def main():
     """Write the logs of an example and truth.json beside them."""
-    kind, record, folder = sys.argv[1:4]
-    make = {"station": make_station, "upright": make_upright}[kind]
-    truth = make(record, Path(folder), *map(int, sys.argv[4:5]))
-    text = json.dumps(truth, indent=1) + "\n"
-    (Path(folder) / "truth.json").write_text(text, encoding="utf-8")
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("kind", choices=("station", "upright"))
+    parser.add_argument("record", help="record.json with the table of the tank")
+    parser.add_argument("folder", type=Path, help="written here")
+    parser.add_argument("days", type=int, nargs="?")
+    options = parser.parse_args()
+    make = {"station": make_station, "upright": make_upright}[options.kind]
+    days = () if options.days is None else (options.days,)
+    text = json.dumps(make(options.record, options.folder, *days), indent=1) + "\n"
+    (options.folder / "truth.json").write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
