@@ -322,7 +322,7 @@ def test_roles_decide_about_every_change(staff, folder, role):
         "/register/withdraw": approve, f"/job/{key}/act": edit, f"/job/{key}/add-table": edit,
         f"/job/{key}/recover": edit, f"/job/{key}/import/0": edit, f"/job/{key}/run": run,
         f"/job/{key}/stop": run, f"/job/{key}/overrule": edit, f"/job/{key}/take-over": edit,
-        f"/job/{key}/issue": approve,
+        f"/job/{key}/issue": approve, "/service": edit, f"/service/{key}": edit,
     }  # fmt: skip
     for path, is_permitted in table.items():
         if path.endswith("/run"):

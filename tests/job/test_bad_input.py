@@ -57,7 +57,7 @@ BAD_SETTINGS = [
     ("table.minimum_delivery_m", 0, "above 0"),
     ("table.minimum_delivery_m", [1.5, 2, 1.5], "expected it once"),
     ("table.minimum_delivery_m", "1,5", "such as 20; 80"),
-    ("table.rule", "API", "or one of france_2003, france_2003_alcohol"),
+    ("table.rule", "API", "or one of eu_71_349, france_2003, france_2003_alcohol"),
     ("table.rule", "oiml_r17", "(did you mean oiml_r71?)"),
     ("table.rule", "house.toml", "no such file beside the job"),
     ("table.rule", "../house.toml", "found '../house.toml'"),
