@@ -18,6 +18,7 @@ import venv
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+LONGEST_S = 300  # for a program or its installation
 PROGRAMS = {
     "GNU Gama": ["apt-get", "--simulate", "install", "gama"],
     "JAG3D": ["mvn", "-q", "-B", "dependency:get", "-Dartifact=org.applied-geodesy:jag3d:LATEST"],
@@ -36,17 +37,23 @@ def main(folder):
     errors = {}
     for peer in wanted():
         command = [python, "-m", "pip", "install", "--quiet", peer]
-        done = subprocess.run(command, capture_output=True, text=True)
-        if done.returncode:
-            name = re.match(r"[\w.-]+", peer).group()
-            errors[name] = told(done.stderr)
+        name = re.match(r"[\w.-]+", peer).group()
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S)
+            wrong = told(done.stderr) if done.returncode else ""
+        except subprocess.TimeoutExpired:
+            wrong = f"not within {LONGEST_S} s"
+        if wrong:
+            errors[name] = wrong
             print(f"{name} could not be installed: {errors[name]}")
     for name, command in PROGRAMS.items():
         try:
-            done = subprocess.run(command, capture_output=True, text=True)
+            done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S)
             wrong = missed(done.stdout + done.stderr) if done.returncode else ""
         except OSError as error:
             wrong = f"{command[0]}: {error.strerror}"
+        except subprocess.TimeoutExpired:
+            wrong = f"not within {LONGEST_S} s"
         errors[name] = wrong or "a package exists, not measured yet"
         print(f"{name}: {errors[name]}")
     (Path(folder) / "errors.json").write_text(json.dumps(errors, indent=1), encoding="utf-8")
