@@ -18,6 +18,7 @@ from tankcal.camera.model import PARAMETERS, UNITS, Form
 from tankcal.geometry.rotations import apply_small_rotation, rotation_vector
 from tankcal.pipeline.chain import run
 from tankcal.pipeline.checks.survey import refuse_undetermined
+from tankcal.pipeline.wall.finding import take_points
 from tankcal.pipeline.wall.surveyed import s_transform
 from tankcal.survey import wall_points
 from tankcal.survey.network.adjustment import GlobalTest
@@ -417,7 +418,8 @@ class TopOfTank:
         points, snooping = s_transform(points), job.snooping
         # The selected points are not tested again: they are common to all runs.
         if self._wall is not None:
-            points, snooping = _select_points(points, self._wall), False
+            chosen = [row for row, name in enumerate(points.names) if name in self._wall]
+            points, snooping = take_points(points, np.array(chosen, dtype=int)), False
         table = replace(
             job.table, step_m=STEP_M, height_unit="m", fine_step_m=None, fine_zones=(),
             max_interpolation_error_m3=None, other_densities_kg_m3=(),
@@ -433,20 +435,3 @@ def _read_top_volume(result):
     points = None if accepted is None else len(accepted)
     values = (float(value) for value in (top.value_m3, top.u_m3, top.U_m3, top.k))
     return TopVolume(*values, height_m, points)
-
-
-def _select_points(points, names):
-    """Select the points with these names from a job.Points."""
-    rows = np.array([i for i, name in enumerate(points.names) if name in names], dtype=int)
-    # Columns x, y and z of each point in the covariance matrix
-    columns = (3 * rows[:, None] + np.arange(3)).ravel()
-    return replace(
-        points,
-        names=tuple(points.names[i] for i in rows),
-        xyz_m=points.xyz_m[rows],
-        covariance_m2=points.covariance_m2.take(rows),
-        section=tuple(points.section[i] for i in rows),
-        generatrix=tuple(points.generatrix[i] for i in rows),
-        rows=tuple(points.rows[i] for i in rows),
-        causes=tuple(replace(cause, column_m=cause.column_m[columns]) for cause in points.causes),
-    )
