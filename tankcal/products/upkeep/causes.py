@@ -213,8 +213,7 @@ class Operation:
         marks, prior = steps.marks, self.priors
         count = len(marks.time_ns)
         smoothed = np.zeros((count, 3)) if smoothed is None else smoothed
-        start = marks.time_ns[0] if self.start_ns is None else self.start_ns
-        years = (marks.time_ns - start) * 1e-9 / YEAR_S
+        years = self._years(marks)
         warm = fill_gaps(marks.time_ns, marks.temperature_c, self.stock.base_c)
         # At adjusted levels, as all columns: readings share their errors with the misclosures.
         own_error = smoothed[:, 0] + smoothed[:, 1]
@@ -290,6 +289,18 @@ class Operation:
             walk_per_s=np.array([self._meter(name).walk ** 2 for name in steps.meters]) / YEAR_S,
         )  # fmt: skip
         return Balance(misclosure, columns, causes, drift, level)
+
+    def split_steps(self, steps):
+        """Changes of the stock, metered and delivered volumes at the levels as read, (n,) each."""
+        warm = fill_gaps(steps.marks.time_ns, steps.marks.temperature_c, self.stock.base_c)
+        stock = self.stock.stock_m3(steps.marks.level_m, warm, np.zeros(len(self.stock.names)))
+        metered = self._flows(steps, warm, self._years(steps.marks))[0].sum(axis=1)
+        return np.diff(stock), metered, self._deliveries(steps, warm)
+
+    def _years(self, marks):
+        """Time of each mark since the time from which drifts count."""
+        start = marks.time_ns[0] if self.start_ns is None else self.start_ns
+        return (marks.time_ns - start) * 1e-9 / YEAR_S
 
     def _meter(self, name):
         """`Meter` with the priors in place of blanks."""

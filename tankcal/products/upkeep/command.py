@@ -60,6 +60,11 @@ def add(commands):
         help="keep results of this run in this folder, so that the next month takes less time; "
         "the output is equal without it",
     )
+    upkeep.add_argument(
+        "--steps",
+        action="store_true",
+        help="save every step with its times; they show sales and working hours (default: days)",
+    )
     add_letterhead(upkeep)
     add_language(upkeep)
     upkeep.add_argument("--quiet", action="store_true", help="no progress, only problems")
@@ -91,7 +96,7 @@ def _upkeep(options):
     if options.language is None and inputs.sections["upkeep"]["language"] is not None:
         speak(inputs.sections["upkeep"]["language"])
     show.step(message("upkeep_estimating", "estimating the tank"))
-    result = keep_up(inputs, state)
+    result = keep_up(inputs, state, with_steps=options.steps)
     upkeep, written = to_plain(result), ()
     if options.record is not None:
         from tankcal.products.upkeep.new_record import make_record, write_record

@@ -151,10 +151,23 @@ CAUSES = Table(
     ),
     rows=lambda upkeep: upkeep["causes"],
 )
+STEPS = Table(
+    "upkeep_steps",
+    (
+        _text("first", 20),
+        _text("last", 20),
+        Column("kind", words="step_kinds", csv="kind", sheet=True, width=12),
+        *(_number(name, "u_m3", "m3") for name in (
+            "by_table_m3", "by_meters_m3", "by_tickets_m3", "losses_m3", "misclosure_m3", "u_m3")),
+        _plain("w", 1),
+        Column("left_out", words="findings", csv="left_out", sheet=True, width=34),
+    ),
+    rows=lambda upkeep: upkeep.get("steps") or [],
+)  # fmt: skip
 FILES = {
     "table.csv": ROWS, "deliveries.csv": DELIVERIES, "meters.csv": METERS, "months.csv": MONTHS,
     "alarms.csv": SUSPECTS, "cleaning.csv": CLEANING, "causes.csv": CAUSES,
-    "sizes.csv": SIZES,
+    "sizes.csv": SIZES, "steps.csv": STEPS,
 }  # fmt: skip
 
 
@@ -303,6 +316,8 @@ def _remarks(paper):
     upkeep = paper.record
     texts = [paper.warning(warning) for warning in upkeep["warnings"]]
     texts += paper.words["standing"].values()
+    texts.append(paper.word("texts.single_steps", count=len(upkeep["steps"]))
+                 if upkeep.get("steps") else paper.word("texts.privacy"))  # fmt: skip
     files = ", ".join(
         f"{item['file']} {item['sha256'][:DIGEST]}"
         + (f" ({item['rows']}: {item['first']} – {item['last']})" if item["rows"] else "")
@@ -362,7 +377,7 @@ def _sheets(book):
         Sentences(_remarks(paper), title=paper.words["headings"]["remarks"]),
     ]
     yield SheetContent("upkeep_result", parts, landscape=False, widths=(42, 58))
-    for table in (ROWS, DELIVERIES, METERS, MONTHS, SUSPECTS, CLEANING, CAUSES, SIZES):
+    for table in (ROWS, DELIVERIES, METERS, MONTHS, SUSPECTS, CLEANING, CAUSES, SIZES, STEPS):
         if table.rows(paper.record):
             yield SheetContent(table.name, [cell_table(book, table)], tab="result")
 

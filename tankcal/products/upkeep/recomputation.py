@@ -47,7 +47,8 @@ def compute_again(saved, folder):
             file=UPKEEP.file,
         )
         return None, [], [note]
-    again = to_plain(keep_up(read_upkeep(settings, source=saved["inputs"]["upkeep"]["record"])))
+    inputs = read_upkeep(settings, source=saved["inputs"]["upkeep"]["record"])
+    again = to_plain(keep_up(inputs, with_steps="steps" in saved))
     return *compare_values(UPKEEP.file, _drop_texts(saved), _drop_texts(again)), []
 
 

@@ -13,6 +13,7 @@ UPKEEP = SavedFormat(
 )
 MODES = ("improved", "deliveries", "watched")
 STARTS = ("record", "table", "job", "drawing", "sales")
+STEP_KINDS = ("rest", "sales", "delivery")
 VERDICTS = ("pass", "fail", "inconclusive")
 
 
@@ -152,6 +153,24 @@ class UpkeepWatch(Saved):
     suspects: list[UpkeepSuspect] = key("the most likely first")
 
 
+class UpkeepStep(Saved):
+    """A single step, which is saved only on demand."""
+
+    first: str = key("time of the first mark, UTC")
+    last: str = key("time of the last mark, UTC")
+    kind: str = key(", ".join(STEP_KINDS))
+    by_table_m3: Finite = key("change of the stock by the table in force, at the base temperature")
+    by_meters_m3: Finite = key("metered volume at the base temperature, with expected wear")
+    by_tickets_m3: Finite = key("delivered volume at the base temperature")
+    losses_m3: Finite = key("expected losses")
+    misclosure_m3: Finite = key("by tickets less by meters, losses and by table")
+    u_m3: Finite = key("standard uncertainty of the misclosure by all causes")
+    w: float | None = key(
+        "misclosure less its prediction by earlier steps, over its standard deviation; null: unused"
+    )
+    left_out: str | None = key("reason why the step is unused; null: used")
+
+
 class UpkeepCount(Saved):
     """Rows of a log of a kind."""
 
@@ -206,3 +225,6 @@ class UpkeepFile(Saved, kw_only=True):
     inputs: dict = key("upkeep.toml as {section: {key: value}}, without blank keys")
     files: list[UpkeepSource] = key("input files in the order of reading")
     warnings: list[WarningRecord] = key("on the upkeep")
+    steps: list[UpkeepStep] | None = key(
+        "each step, only with --steps", default=None, optional=True
+    )

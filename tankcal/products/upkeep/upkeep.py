@@ -37,7 +37,7 @@ _OF_STOCK = {"no_traceable_meter": "stock_meter"}  # reasons without a calibrati
 VARIANCE_RATIO = 2.0  # of observed and declared variances, beyond which a warning is given
 
 
-def keep_up(inputs, state=NO_STATE):
+def keep_up(inputs, state=NO_STATE, *, with_steps=False):
     """Estimate the table and the meters of a tank, and watch it.
 
     Parameters
@@ -45,6 +45,8 @@ def keep_up(inputs, state=NO_STATE):
     inputs : reading.Inputs
     state : state.State, optional
         Results of earlier runs.
+    with_steps : bool
+        Whether the result has every step with its times, which show the throughput of each day.
 
     Returns
     -------
@@ -150,6 +152,7 @@ def keep_up(inputs, state=NO_STATE):
         inputs=drop_blanks(sections),
         files=_chain(inputs.sources),
         warnings=warnings_of(warnings),
+        steps=list_steps(operation, estimation) if with_steps else None,
     )  # fmt: skip
 
 
@@ -277,6 +280,42 @@ def _meters(estimation, operation, inputs, factor, low, high, k, scale):
             )
         )  # fmt: skip
     return meters
+
+
+def list_steps(operation, estimation):
+    """Every step at the levels as read, by the table in force.
+
+    Parameters
+    ----------
+    operation : causes.Operation
+    estimation : estimation.Estimation
+
+    Returns
+    -------
+    list of saved.UpkeepStep
+    """
+    steps = estimation.steps
+    change, metered, delivered = operation.split_steps(steps)
+    balance = operation.linearize(steps)
+    losses = delivered - metered - change - balance.misclosure_m3
+    # Without a use of any step, the filter has the variances by the causes that drift alone.
+    drift = replace(balance.drift, is_used=np.zeros(len(steps), dtype=bool))
+    gains = whiten_steps(drift, balance.columns_m3[:, :1]).gains
+    variance = np.einsum("ni,nij,nj->n", gains.effect, gains.covariance, gains.effect)
+    u = np.sqrt(variance + drift.noise_m3**2 + np.sum(balance.columns_m3**2, axis=1))
+    kinds = np.where(steps.tickets > 0, 2, np.where(metered > 0, 1, 0))
+    left_out = [REASONS[code] or None for code in steps.reason]
+    for place in estimation.rejected:
+        left_out[place] = "outlier"
+    times = np.datetime_as_string(steps.marks.time_ns.view("datetime64[ns]"), unit="s").tolist()
+    columns = (values.tolist() for values in (change, metered, delivered, losses,
+                                              balance.misclosure_m3, u))  # fmt: skip
+    return [
+        saved.UpkeepStep(first, last, saved.STEP_KINDS[kind], *numbers,
+                         float(w) if reason is None else None, reason)
+        for (first, last), kind, *numbers, w, reason in zip(
+            pairwise(times), kinds, *columns, estimation.innovations, left_out, strict=True)
+    ]  # fmt: skip
 
 
 def _causes(estimation):
