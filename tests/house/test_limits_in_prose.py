@@ -30,7 +30,7 @@ from tankcal.job.checks.survey import readings as survey_checks
 from tankcal.job.contract import registers
 from tankcal.methods.clouds import bottom as clouds_bottom
 from tankcal.methods.clouds import cluster, overlaps
-from tankcal.methods.clouds import warnings as clouds_warnings
+from tankcal.methods.clouds import wall as clouds_warnings
 from tankcal.methods.clouds.columns import ASSUMED
 from tankcal.methods.great_circles import sphere as circles
 from tankcal.methods.hits import wall as hits_wall
@@ -39,8 +39,8 @@ from tankcal.methods.inside_hits import solid as inside_solid
 from tankcal.methods.lines import warnings
 from tankcal.methods.lines import warnings as lines_warnings
 from tankcal.methods.liquid import columns as liquid_columns
-from tankcal.methods.liquid import facts as liquid_facts
-from tankcal.methods.strapping import tape_warnings
+from tankcal.methods.liquid import tables as liquid_facts
+from tankcal.methods.strapping import warnings as tape_warnings
 from tankcal.pipeline import overruling_effects as overruling
 from tankcal.pipeline import scanned_solids
 from tankcal.pipeline import simulation as simulation_model

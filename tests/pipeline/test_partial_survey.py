@@ -17,7 +17,7 @@ from radii_jobs import HEIGHTS_M, RADII_M, closed_volume_m3, partial_parts, radi
 
 import tankcal
 from tankcal.errors import SolutionError
-from tankcal.methods.radii.update import update_radii
+from tankcal.methods.radii.wall import update_radii
 from tankcal.methods.strapping.saved import save_strapping
 
 EXAMPLES_AT = Path(__file__).resolve().parents[2] / "examples"

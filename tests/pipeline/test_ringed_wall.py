@@ -11,8 +11,7 @@ from ringed_jobs import reading_of, ringed_parts
 
 import tankcal
 from tankcal.geometry.field.components import COMPONENTS
-from tankcal.methods.rings.wall import find_ringed_wall
-from tankcal.methods.rings.warnings import exchanged_rings
+from tankcal.methods.rings.wall import exchanged_rings, find_ringed_wall
 from tankcal.pipeline.tanks import body_of
 from tankcal.record import record_of
 

@@ -5,7 +5,7 @@ import pytest
 from job_builder import S_1, strapped_parts
 from test_strapped_wall import result_of, straps_with
 
-from tankcal.methods.strapping.tape_warnings import _of_copies
+from tankcal.methods.strapping.warnings import _of_copies
 from tankcal.survey.strapping import Strap
 
 

@@ -26,8 +26,8 @@ from written_clouds import write_cloud
 
 import tankcal
 from tankcal.errors import InputError
+from tankcal.methods.clouds import wall as cloud_checks
 from tankcal.methods.clouds import wall as cloud_wall
-from tankcal.methods.clouds import warnings as cloud_checks
 from tankcal.methods.clouds.overlaps import RegistrationTest, overlap_test, overlaps_of
 from tankcal.record import record_of
 from tankcal.record.schema import check_data

@@ -44,7 +44,7 @@ class CloudsMethod(Method):
         "no_cloud_at_all", "nothing filled in; expected a section for each file of a scanner"
     )
 
-    check = Delegate("tankcal.methods.clouds.checks:check_clouds")
+    check = Delegate("tankcal.methods.clouds.readings:check_clouds")
     read = Delegate("tankcal.methods.clouds.readings:make_clouds")
 
     # ---- pipeline
@@ -65,7 +65,7 @@ class CloudsMethod(Method):
         )
         return Surveyed(job, survey, sights={"clouds": clouded})
 
-    warnings = Delegate("tankcal.methods.clouds.warnings:check_clouds")
+    warnings = Delegate("tankcal.methods.clouds.wall:check_clouds")
 
     # ---- record
 
@@ -81,7 +81,7 @@ class CloudsMethod(Method):
 
     report_tables = Import("tankcal.methods.clouds.tables")
     report_figures = Import("tankcal.methods.clouds.figures")
-    facts = Import("tankcal.methods.clouds.facts:FACTS")
+    facts = Import("tankcal.methods.clouds.tables:FACTS")
 
     def sheets(self, record):
         tables = [table for table in self.report_tables().TABLES if table.rows(record)]

@@ -73,7 +73,7 @@ class GreatCirclesMethod(Method):
     def solid_part(self, survey, plate_m, scale):
         return survey.solid(plate_m, scale), survey.arguments_of_part(plate_m, scale), ("offset",)
 
-    warnings = Delegate("tankcal.methods.great_circles.warnings:check_circles")
+    warnings = Delegate("tankcal.methods.great_circles.sphere:check_circles")
 
     # ---- record
 

@@ -49,7 +49,7 @@ class InsideHitsMethod(Method):
         )
         return Surveyed(job_of_points, scan, sights={self.name: sighting})
 
-    warnings = Delegate("tankcal.methods.inside_hits.warnings:check_hits_inside")
+    warnings = Delegate("tankcal.methods.inside_hits.solid:check_hits_inside")
 
     # ---- record
 

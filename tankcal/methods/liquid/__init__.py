@@ -56,14 +56,14 @@ class LiquidMethod(Method):
     )
 
     def check(self, values, tables, registers, raw, log):
-        from tankcal.methods.liquid.checks import check_liquid, tell_without_rows
+        from tankcal.methods.liquid.readings import check_liquid, tell_without_rows
 
         if not self.is_given(tables):
             tell_without_rows(tables, registers, raw, log)
             return
         check_liquid(values, tables, registers, raw, log)
         if values is not None:
-            from tankcal.methods.liquid.checks import check_metering
+            from tankcal.methods.liquid.readings import check_metering
 
             check_metering(values, tables, registers, raw, log)
 
@@ -99,8 +99,8 @@ class LiquidMethod(Method):
 
     report_tables = Import("tankcal.methods.liquid.tables")
     report_figures = Import("tankcal.methods.liquid.figures")
-    facts = Import("tankcal.methods.liquid.facts:FACTS")
-    unchecked = Delegate("tankcal.methods.liquid.facts:hidden_errors")
+    facts = Import("tankcal.methods.liquid.tables:FACTS")
+    unchecked = Delegate("tankcal.methods.liquid.tables:hidden_errors")
     field_blocks = Delegate("tankcal.methods.liquid.field_sheets:blocks_of_liquid")
     field_columns = Delegate("tankcal.methods.liquid.field_sheets:columns_of_batches")
 

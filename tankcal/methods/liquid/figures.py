@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.methods.liquid import tables
-from tankcal.methods.liquid.facts import control_text, density_text, with_u
+from tankcal.methods.liquid.tables import control_text, density_text, with_u
 from tankcal.report import numbers
 from tankcal.report.plots.style import FAINT, GREY, INK, RED, WIDTH, Drawing, set_margins, styled
 

@@ -72,7 +72,7 @@ class RadiiMethod(Method):
 
         return Surveyed(job, find_radii_wall(job, progress))
 
-    complete = Delegate("tankcal.methods.radii.update:update_by_survey")
+    complete = Delegate("tankcal.methods.radii.wall:update_by_survey")
 
     def former_radii_m(self, job):
         import numpy as np

@@ -45,7 +45,7 @@ def save_radii(result):
     """`RadiiRecord` of a result."""
     wall, radii, change = result.radii, result.job.radii, None
     if wall.updated is not None:
-        from tankcal.methods.radii.update import LARGEST_W
+        from tankcal.methods.radii.wall import LARGEST_W
 
         declared = radii.change
         change = ChangeOfRadii(declared.common_m, declared.own_m, declared.shared_m, LARGEST_W)

@@ -53,7 +53,7 @@ class RingsMethod(Method):
 
     inside_radii = Delegate("tankcal.methods.rings.wall:inside_radii")
     part = Delegate("tankcal.methods.rings.wall:ringed_part")
-    warnings = Delegate("tankcal.methods.rings.warnings:check_rings")
+    warnings = Delegate("tankcal.methods.rings.wall:check_rings")
 
     # ---- record
 

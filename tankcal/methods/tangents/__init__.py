@@ -90,7 +90,7 @@ class TangentsMethod(Method):
         )
         return Surveyed(job_of_points, wall, sights={"tangents": touching})
 
-    warnings = Delegate("tankcal.methods.tangents.warnings:check_tangents")
+    warnings = Delegate("tankcal.methods.tangents.wall:check_tangents")
 
     # ---- record
 
