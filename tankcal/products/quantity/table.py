@@ -160,13 +160,15 @@ def table_of(source):
         return read_table(path)
 
 
-def read_table(path):
+def read_table(path, record=None):
     """Read the table of a record.
 
     Parameters
     ----------
     path : Path
         A record.json.
+    record : dict, optional
+        Its content, if it was read already.
 
     Returns
     -------
@@ -177,7 +179,7 @@ def read_table(path):
     InputError
         If the file is no record, or contains no capacity table.
     """
-    record = records.load(path)
+    record = records.load(path) if record is None else record
     capacity, job = record["capacity"], record["job"]
     if not capacity:
         expected = message(

@@ -96,19 +96,21 @@ def find_offset_s(time_ns, stock_m3, flows, last_s=None):
     float or None
         Seconds; None with too few sales.
     """
-    change, sales, middles, margin = np.diff(stock_m3), 0, [], MOST_OFFSET_S * 10**9
+    change, middles, volumes, margin = np.diff(stock_m3), [], [], MOST_OFFSET_S * 10**9
     for flow in flows:
         low = np.searchsorted(flow.time_ns, time_ns[0] - margin)
         high = np.searchsorted(flow.time_ns, time_ns[-1] + 2 * margin)
-        middle = np.sort(flow.begin_ns[low:high] // 2 + flow.time_ns[low:high] // 2)
-        sales += int(np.sum((middle > time_ns[0]) & (middle < time_ns[-1])))
-        middles.append((middle, flow.total_m3[low : high + 1]))
-    if sales < LEAST_SALES:
+        middles.append(flow.begin_ns[low:high] // 2 + flow.time_ns[low:high] // 2)
+        volumes.append(np.diff(flow.total_m3[low : high + 1]))
+    middle = np.concatenate([np.zeros(0, dtype=np.int64), *middles])
+    if np.sum((middle > time_ns[0]) & (middle < time_ns[-1])) < LEAST_SALES:
         return None
+    order = np.argsort(middle, kind="stable")
+    middle, total = middle[order], np.append(0.0, np.cumsum(np.concatenate(volumes)[order]))
 
     def misfit(offset):
         at = time_ns - int(offset) * 10**9
-        sold = sum(total[np.searchsorted(middle, at)] for middle, total in middles)
+        sold = total[np.searchsorted(middle, at)]
         return np.minimum(np.abs(change + np.diff(sold)), MOST_STEP_M3).sum()
 
     if last_s is not None:

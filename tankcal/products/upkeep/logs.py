@@ -10,6 +10,7 @@ import re
 import struct
 from collections import defaultdict
 from dataclasses import dataclass, field
+from itertools import islice
 
 import numpy as np
 import pandas as pd
@@ -24,7 +25,7 @@ CHUNK = 200_000  # rows
 MOST_BAD_ROWS = 3  # rows named in messages of a file
 MOST_CAPTURE_BYTES = 200_000_000  # read as a whole
 MOST_LOG_BYTES = 4_000_000_000  # of a CSV file, read in chunks
-HEAD_BYTES = 65_536  # by which the layout of a file is found
+HEAD_BYTES, LAYOUT_ROWS = 65_536, 50  # by which the layout of a file is found
 COMMA_NUMBER = re.compile(r"(?:^|[;\t|\"])\s*-?\d+,\d+\s*(?:$|[;\t|\"])")
 TIMES = ("time", "begin", "end")
 TEXTS = ("tank", "meter", "ticket", "kind", "quality", "tag")
@@ -201,11 +202,11 @@ class LogFile:
         first = int(options.get("skip_rows") or 0)
         while first < len(lines) and not is_row(lines[first]):
             first += 1
-        rows = [line for line in lines[first:] if is_row(line)]
-        separator = options.get("separator") or separator_of_text("\n".join(rows[:50]), ",")
+        rows = list(islice((line for line in lines[first:] if is_row(line)), LAYOUT_ROWS))
+        separator = options.get("separator") or separator_of_text("\n".join(rows), ",")
         decimal = options.get("decimal")
         if decimal is None:
-            has_comma = any(COMMA_NUMBER.search(line) for line in rows[1:50])
+            has_comma = any(COMMA_NUMBER.search(line) for line in rows[1:])
             decimal = "," if separator != "," and has_comma else "."
         cells = next(csv.reader(rows[:1], delimiter=separator), [])
         return Layout(

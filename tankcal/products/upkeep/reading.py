@@ -16,7 +16,6 @@ from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.entries import read_columns
 from tankcal.job.fields import Field
 from tankcal.job.folder import read_csv
-from tankcal.job.model import InputFile
 from tankcal.job.tables import Log, read_bytes, shown
 from tankcal.messages import message
 from tankcal.products.quantity.table import read_table
@@ -174,6 +173,9 @@ class Inputs:
 
     def files(self):
         """`InputFile`s in the order of reading."""
+        # Only a new record has them, and a month without one loads less.
+        from tankcal.job.model import InputFile
+
         return [InputFile(source.file, source.sha256, (self.folder / source.file).stat().st_size)
                 for source in self.sources]  # fmt: skip
 
@@ -270,7 +272,8 @@ def read_upkeep(folder, state=NO_STATE, source=None):
         for kind in ("events", "meters", "deliveries", "air", "levels")
     }
     meters = _read_meters(folder, marks, log, sources)
-    former = None if start is None else records.load(start.path).get("upkeep")
+    record = None if start is None else records.load(start.path)
+    former = record and record.get("upkeep")
     known = {source.sha256: source.file for source in sources if source.kind not in FIXED}
     for digest in sorted(known.keys() & set(former["logs"] if former else ())):
         log.problem(known[digest], message(
@@ -281,7 +284,7 @@ def read_upkeep(folder, state=NO_STATE, source=None):
     stock = (
         LyingStock(sections["drawing"], expansion, base)
         if start is None
-        else TableStock(read_table(start.path), expansion, base)
+        else TableStock(read_table(start.path, record), expansion, base)
     )
     for text in () if start is None else start.warnings:
         log.warning(start.files[0].name, text)
