@@ -20,7 +20,7 @@ else
 	$(BIN)/tankcal demo --out demo-results
 endif
 
-test: $(VENV)/full ## the tests that take no more than half a second each (under two minutes)
+test: $(VENV)/full ## the tests of a tenth of a second or less, and those of the core (a minute)
 	$(BIN)/pytest
 
 test-slow: $(VENV)/full ## the others: papers of all kinds, many cases, studies at a twentieth of their size

@@ -88,6 +88,7 @@ def test_no_change_from_another_origin(client, site, folder, origin):
     assert client.put("/new", headers=headers).status_code == 421
 
 
+@pytest.mark.slow
 def test_the_token_becomes_a_cookie_and_leaves_the_address(client):
     client.cookies.clear()
     answer = client.get(f"/new?token={TOKEN}&language=es&upload=1")
@@ -185,6 +186,7 @@ def test_behind_a_proxy_only_its_name_and_prefix_are_answered(site):
 # ---- pages
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_pages_are_in_the_language_of_the_browser(client, site, folder, language):
     client.cookies.clear()
@@ -225,6 +227,7 @@ def test_the_script_is_small_and_loads_nothing():
     assert not re.search(r"https?://|eval\(|innerHTML|document\.write", text)
 
 
+@pytest.mark.slow
 def test_texts_of_a_job_are_escaped(client, site, folder):
     path = folder / "job.toml"
     path.write_text(
@@ -238,6 +241,7 @@ def test_texts_of_a_job_are_escaped(client, site, folder):
 # ---- a job
 
 
+@pytest.mark.slow
 def test_a_new_job_is_created_and_listed(client, site):
     content = {"kind": "horizontal", "survey": "strapping", "tank": "TQ/9"}
     answer = client.post("/new", data=content, headers=ORIGIN)
@@ -276,6 +280,7 @@ def test_an_entry_is_checked_saved_and_undone(client, site, folder):
     assert "0.97" in (folder / "points.csv").read_text()
 
 
+@pytest.mark.slow
 def test_a_setting_is_entered_with_the_decimal_mark(client, site, folder):
     key = site.add(folder)
     action = {"kind": "setting", "section": "tank", "key": "nominal_diameter_m", "text": "12,75"}
@@ -349,6 +354,7 @@ def test_broken_requests_are_refused(client, site, folder, content):
     assert client.get(f"/job/{key}/grid/points").status_code == 200
 
 
+@pytest.mark.slow
 def test_an_entry_of_a_page_of_an_earlier_server_is_not_made(client, site, folder):
     key = site.add(folder)
     reading = client.get(f"/job/{key}/changes?since=0").json()["desk"]
@@ -388,6 +394,7 @@ def test_files_changed_by_another_program_are_read_again(client, site, folder):
     assert "# more" in path.read_text()
 
 
+@pytest.mark.slow
 def test_unsaved_edits_are_offered_after_a_crash(client, site, folder):
     key = site.add(folder)
     act(client, key, "points", {"kind": "enter", "changes": [[0, "z_m", "0,97"]]})
@@ -465,6 +472,7 @@ def test_a_table_is_imported_with_its_mapping(client, site, folder):
     assert rows[2][:4] == ["N1", "0,25", "6500,5", "0,95"]
 
 
+@pytest.mark.slow
 def test_an_upload_without_a_job_asks_for_the_tank(client, site, folder):
     site.add(folder)
     address = upload(client, b"point,x_m,y_m,z_m\nA,1.5,2.5,3.5\n")
@@ -499,6 +507,7 @@ def send_folder(client, name, files):
     return answer.json()["address"]
 
 
+@pytest.mark.slow
 def test_a_job_folder_becomes_a_job(client, site, folder):
     files = {f"tank 9/{path.name}": path.read_bytes() for path in folder.iterdir()}
     strange = ("tank 9/../../out.csv", "tank 9/a\\b.csv", "tank 9/c:x.csv",

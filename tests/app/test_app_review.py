@@ -178,6 +178,7 @@ def test_who_submitted_approves_only_with_a_reason(client, site, folder, monkeyp
     assert decide("approved", "Rui").status_code == 303
 
 
+@pytest.mark.slow
 def test_an_approved_job_is_read_only_until_it_is_revised(client, site, folder):
     key, sha = site.add(folder), write_record(folder)
     page = client.get(f"/job/{key}/review").text

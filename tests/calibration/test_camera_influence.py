@@ -140,6 +140,7 @@ def test_the_camera_that_made_the_images_changes_nothing():
     assert pair.photos.largest_turn_rad == 0
 
 
+@pytest.mark.slow
 def test_a_wrong_principal_distance_stretches_the_depth(figure):
     # closed form: stations held, vertical photos: depths are c'/c times the true ones, plan is
     # right, and no image tells: the corrections are of the measured coordinate, without c
@@ -172,7 +173,7 @@ def test_the_check_points_are_those_of_the_record():
         assert expected.difference_m == pytest.approx(d, abs=1e-9)
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_wrong_k1_lifts_or_sinks_the_points(side):
     # the correction is subtracted: a larger K1 makes rays steeper, parallaxes smaller, points lower
@@ -239,6 +240,7 @@ def test_weighted_lies_between_fixed_and_free():
     assert free < between < FLIGHT[0] + 0.02
 
 
+@pytest.mark.slow
 def test_a_calibration_without_sds_is_not_weighted():
     bare = setup_of(FLIGHT, "bare", sd=np.full(13, np.nan))
     some = setup_of(FLIGHT, "some", sd=np.where(np.arange(13) < 3, 0.001, np.nan))
@@ -287,6 +289,7 @@ def test_unfit_calibrations_are_reported_at_once():
         assert part in text
 
 
+@pytest.mark.slow
 def test_one_of_several_cameras_must_be_named():
     job = flight()
     one, *photos = job.measurements.photos

@@ -85,6 +85,7 @@ def seven():
 # the published table, and the file it comes from
 
 
+@pytest.mark.slow
 def test_zrot_of_the_seven_calibrations(seven, figure):
     result = compare(seven, "zrot", as_published=True)
     error = np.array([pair.figure_px for pair in result.pairs]) - ZROT

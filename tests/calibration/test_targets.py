@@ -82,7 +82,7 @@ def test_the_middle_of_the_first_pixel_is_0_0():
     assert np.abs(marker.centre_px - [87.5, 97.5]).max() < 0.01
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [ARUCO, APRILTAG])
 @pytest.mark.parametrize("blur", [0.7, 1.0, 1.5])
 def test_corners_to_a_tenth_of_a_pixel(name, blur, figure):
@@ -158,6 +158,7 @@ def test_derivatives_of_the_edge():
         assert_derivative(model.residuals, start, model.jacobian(start))
 
 
+@pytest.mark.slow
 def test_diagonals_meet_in_the_centre():
     """Truth: projection of the centre; sd by simulation of the corners."""
     corners = tilted_square((50, 60), 40, 50, 20, 70, distance=3)
@@ -311,7 +312,7 @@ def discs(diameter=16, incidence=30.0, blur=1.0, noise=2.0, seed=0, count=6):
     return image, np.array(ellipses), np.array(circles)
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("blur", [0.7, 1.0, 1.5])
 def test_centres_of_circles(blur, figure):
     """Truth: rendered, 16 px across, 30 degrees."""

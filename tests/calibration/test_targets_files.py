@@ -65,6 +65,7 @@ def test_corners_get_their_names(photos, tmp_path):
     assert rows_of(reading.refused_path) == []
 
 
+@pytest.mark.slow
 def test_centres_have_the_plain_name(photos, tmp_path):
     reading = read_photographs(
         photos[:1], tmp_path / "o.csv", TargetSettings(what="centres", dictionary=ARUCO)
@@ -73,6 +74,7 @@ def test_centres_have_the_plain_name(photos, tmp_path):
     assert any("give the list of the ids" in str(one) for one in reading.warnings)
 
 
+@pytest.mark.slow
 def test_refused_targets_are_listed(photos, tmp_path):
     names = tmp_path / "names.csv"
     names.write_text("id,point\n9,T9\n")
@@ -84,6 +86,7 @@ def test_refused_targets_are_listed(photos, tmp_path):
     assert reading.refused == {"not_listed": 1}
 
 
+@pytest.mark.slow
 def test_existing_file_is_not_overwritten(photos, tmp_path):
     out = tmp_path / "image_points.csv"
     out.write_text("mine")
@@ -173,6 +176,7 @@ def circles(tmp_path):
     return path, middles
 
 
+@pytest.mark.slow
 def test_circles_are_named_by_their_places(circles, tmp_path):
     path, middles = circles
     places = tmp_path / "places.csv"
@@ -186,6 +190,7 @@ def test_circles_are_named_by_their_places(circles, tmp_path):
     assert any("no circle within 15 px of 1 places: 'X'" in str(one) for one in reading.warnings)
 
 
+@pytest.mark.slow
 def test_places_in_photos_that_are_not_given_are_reported(circles, tmp_path):
     places = tmp_path / "places.csv"
     rows = ("disc,C,63,48", "discs,A,63,48", "disc,D,5,5", "other,A,63,48")

@@ -140,7 +140,7 @@ def covered(trials, kind, seed):
     return np.array(found).reshape(-1, 2), np.array(factors), fit.dof
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.twentieth
 @pytest.mark.parametrize("kind", ["affine", "similarity"])
 def test_coverage_of_a_transformed_coordinate(kind, figure):

@@ -254,6 +254,7 @@ def aicon_image(rays, values):
     return values["Xh"] + x + dx, values["Yh"] + y + dy
 
 
+@pytest.mark.slow
 def test_balanced_form_of_aicon():
     """Published: the balanced form, from plain and back, another R0, the sign of Ck."""
     plain = np.array([24.1, 0.1, -0.05, -1e-4, 1.2e-7, -3e-11, 0, 4e-6, -3e-6, 0, 0, 1e-4, -5e-5])

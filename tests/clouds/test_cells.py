@@ -37,7 +37,7 @@ def _assert_same_bytes(one, other):
         assert getattr(one, name).tobytes() == getattr(other, name).tobytes(), name
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [1, 7, 1000, 4999])
 def test_pieces_and_order_change_nothing(size):  # property
     xyz = _points()

@@ -329,7 +329,7 @@ def _leaved(part, gap=0.06, seed=3, sector=False):
     return scan
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("sector", [False, True])
 @pytest.mark.parametrize("part", [0.35, 0.5, 0.65])
 @pytest.mark.parametrize("gap", [0.03, 0.06])

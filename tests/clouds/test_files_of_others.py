@@ -88,6 +88,7 @@ def test_one_stream_of_laszip_1(tmp_path, chunk):
     np.testing.assert_array_equal(points(path), points(whole))
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(("place", "form", "value", "code"),
                          [(0, "<H", 4, "cloud_file_laz_kind"), (2, "<H", 1, "cloud_file_laz_kind"),
                           (38, "<H", 9, "cloud_file_unsupported"),
@@ -107,7 +108,7 @@ def zeros(path, *positions):
               poses=[((0.0, 0.0, 0.0, 0.0), one) for one in positions])  # fmt: skip
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("position", [(0, 0, 0), (1, 2, 3)])
 def test_a_quaternion_of_zeros_is_no_pose(tmp_path, position):
     path = tmp_path / "scan.e57"

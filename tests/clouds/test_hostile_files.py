@@ -226,6 +226,7 @@ def test_scale_and_offset_that_are_wrong_but_possible(tmp_path, sound, name, pla
         list(read_cloud(describe_cloud(path)))
 
 
+@pytest.mark.slow
 def test_damaged_points_of_e57(tmp_path, sound):
     path, data = tmp_path / "a.e57", bytearray(sound["wall.e57"])
     data[5000] ^= 1
@@ -270,6 +271,7 @@ def test_a_child_that_computes_for_ever(tmp_path, monkeypatch):
     assert "was stopped" in died(tmp_path, monkeypatch, code)
 
 
+@pytest.mark.slow
 def test_a_child_that_wants_all_memory(tmp_path, monkeypatch):
     code = WORK + (
         "from tankcal.clouds.formats import isolation\n"

@@ -45,6 +45,7 @@ def test_laz_is_cut_at_its_chunks(tmp_path):  # invariance
     assert_array_equal(read_by_pieces(header, 60_000), read(header))
 
 
+@pytest.mark.slow
 def test_e57_has_a_piece_for_each_scan(tmp_path):
     scans = [some_wall(count, seed=count) for count in (30, 50)]
     write_e57(tmp_path / "wall.e57", scans)
@@ -74,6 +75,7 @@ def test_a_bad_row_keeps_its_number(tmp_path):
         read_by_pieces(header, 20)
 
 
+@pytest.mark.slow
 def test_a_piece_that_ends_early_is_told_with_both_numbers(tmp_path):
     header = describe_cloud(write_cloud(tmp_path / "wall.laz", some_wall(100)))
     with pytest.raises(InputError):  # the decoder has no points behind the last

@@ -41,7 +41,7 @@ def refusal(path, **settings):
     return str(caught.value)
 
 
-@pytest.mark.slow(after=3)
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("kind", KINDS)
 def test_round_trip_at_coordinates_of_utm(tmp_path, kind):
     xyz = some_wall(centre=UTM)
@@ -50,7 +50,7 @@ def test_round_trip_at_coordinates_of_utm(tmp_path, kind):
     assert_allclose(found, xyz, rtol=0, atol=1e-8)
 
 
-@pytest.mark.slow(after=4)
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("kind", KINDS)
 def test_chunks_and_unit(tmp_path, kind):
     xyz = some_wall(103)
@@ -60,7 +60,7 @@ def test_chunks_and_unit(tmp_path, kind):
     assert_allclose(np.concatenate(parts), 0.3048 * xyz, rtol=0, atol=1e-8)
 
 
-@pytest.mark.slow(after=6)
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("kind", KINDS)
 def test_progress_ends_with_all_points(tmp_path, kind):
     told = []
@@ -69,7 +69,7 @@ def test_progress_ends_with_all_points(tmp_path, kind):
     assert told[-1] == (50, None if kind in ("xyz", "csv") else 50, path.name)
 
 
-@pytest.mark.slow(after=2)
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(
     ("version", "form", "ending"),
     [*itertools.product(["1.2"], [0, 1, 2, 3], ["las", "laz"])]
@@ -82,7 +82,7 @@ def test_point_formats_of_las(tmp_path, version, form, ending):
     assert_allclose(read_all(path), xyz, rtol=0, atol=1e-9)
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "atol"), [("double", 0), ("single", 1e-6), ("scaled", 5.1e-6), ("integer", 0)]
 )
@@ -93,6 +93,7 @@ def test_numbers_of_e57(tmp_path, kind, atol):
     assert_allclose(read_all(path), xyz, rtol=0, atol=atol)
 
 
+@pytest.mark.slow
 def test_spherical_e57_without_returns(tmp_path):
     xyz, path = some_wall(300), tmp_path / "wall.e57"
     state = np.arange(300) % 3
@@ -104,6 +105,7 @@ def test_spherical_e57_without_returns(tmp_path):
     assert told[-1][:2] == (300, 300)
 
 
+@pytest.mark.slow
 def test_scans_and_poses_of_e57(tmp_path):
     from pyquaternion import Quaternion
 
@@ -305,6 +307,7 @@ def test_a_file_that_changed_meanwhile(tmp_path):
         list(read_cloud(header))
 
 
+@pytest.mark.slow
 def test_a_reader_that_is_left_ends_its_child(tmp_path):
     path = write_cloud(tmp_path / "wall.laz", some_wall(1000))
     parts = read_cloud(describe_cloud(path), chunk=10)

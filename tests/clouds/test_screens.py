@@ -42,7 +42,7 @@ def share_near(surface, xyz):
     return np.mean(np.abs(surface.places(xyz)[2]) < 0.08)
 
 
-@pytest.mark.slow(after=4)
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("side", ["inside", "outside"])
 @pytest.mark.parametrize(
     ("radius_m", "share", "off_m", "heights", "dense"),
@@ -81,6 +81,7 @@ def test_wall_that_is_mostly_hidden_is_refused(side, radius_m, share, off_m):
     )
 
 
+@pytest.mark.slow
 def test_wall_without_a_screen_is_that_of_the_first_fit():
     """Property: nothing changes where no surface lies behind the first one."""
     xyz, _ = screened(6.0, "inside", 0.0, 0.6)

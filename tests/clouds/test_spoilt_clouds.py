@@ -118,7 +118,7 @@ def spoil_and_read(kind, sources, folder, counts):
     return f"{refused} refused, none longer than {longest:.1f} s"
 
 
-@pytest.mark.slow(after=2)
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("kind", QUICK)
 def test_some_spoilt_files(sound, kind, tmp_path):
     spoil_and_read(kind, sound[kind], tmp_path, QUICK)

@@ -77,7 +77,7 @@ def test_whitened_rows_have_the_products_of_the_matrix(points, form):
     assert x.T @ solved == pytest.approx(expected[:, 0], rel=1e-9)
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 def test_a_wall_is_that_of_the_matrix():
     """Circle, outline, their derivatives and noise of 500 points to 1e-9, after S-transformation.
 
@@ -100,7 +100,7 @@ def test_a_wall_is_that_of_the_matrix():
         np.testing.assert_allclose(left, right, rtol=0, atol=1e-9 * np.abs(right).max())
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 def test_solids_are_those_of_the_matrix():
     """Second method: sphere and cylinder by the same adjustment with the matrix."""
     xyz, covariance = points_of_wall(MANY)

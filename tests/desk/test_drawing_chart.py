@@ -71,6 +71,7 @@ def test_texts_of_the_form_are_read_or_refused():
     assert read_drawing(tall) == (None, ["step_cm"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", ["en", pytest.param("pt-BR", marks=pytest.mark.slow),
                                       pytest.param("es", marks=pytest.mark.slow)])  # fmt: skip
 def test_the_chart_is_marked_as_no_calibration(language):

@@ -301,6 +301,7 @@ def test_rows_are_imported_as_a_single_edit(folder):
     assert rendered(desk.draft) == before
 
 
+@pytest.mark.slow
 def test_undo_continues_after_a_restart(folder, tmp_path):
     """Edits, some undone, Save, restart: each further Undo and Redo gives the earlier files."""
     state, draw, desk = tmp_path / "state", random.Random(7), open_desk(folder)

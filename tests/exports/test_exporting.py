@@ -40,7 +40,7 @@ def codes(error):
     return [one.expected.code for one in error.value.problems]
 
 
-@pytest.mark.slow(after=4)
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("code", sorted(shipped_profiles()))
 def test_shipped_profiles_round_trip(code, tmp_path):
     """Property: written, read by the linter, same rows, no finding (else it is refused)."""

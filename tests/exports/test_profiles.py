@@ -126,6 +126,7 @@ def test_names_without_a_profile(name):
         find_profile(name)
 
 
+@pytest.mark.slow
 def test_fixed_levels_of_a_console(tmp_path):
     """Closed form of a lying cylinder at 5, 10, ... 100 % of its diameter; no level is chosen."""
     source = exact_record(tmp_path, lying, np.arange(0, 2.4001, 0.01))

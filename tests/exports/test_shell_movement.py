@@ -33,6 +33,7 @@ def test_shortening_by_quadrature():
     )
 
 
+@pytest.mark.slow
 def test_line_of_s1():
     """Published: L_0 = 2.46 m, D = 0.0618 mm/m, off by 0.030 mm."""
     found = gauge_correction(8.4, S1, 850, 206e9)
@@ -46,6 +47,7 @@ def test_line_of_s1():
     assert round(1000 * found.off_m, 3) == 0.030
 
 
+@pytest.mark.slow
 def test_no_line_is_nearer():
     """Property: the stated distance is reached, and no neighbouring line has a smaller one."""
     found = gauge_correction(8.4, S1, 850, 206e9)

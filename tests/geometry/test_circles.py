@@ -133,6 +133,7 @@ def _seen_from_outside(form_m, set_ups=4, away_m=10.0, radius_m=5.0, count=80):
     return xy, columns @ columns.T + 1e-8 * np.eye(2 * count)
 
 
+@pytest.mark.slow
 def test_waves_under_shared_errors_have_a_circle():
     """The iteration at adjusted points alternates; second method: a search without derivatives."""
     xy, covariance = _seen_from_outside(0.15)

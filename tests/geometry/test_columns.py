@@ -144,6 +144,7 @@ def test_seams_at_random_places_are_within_u(shape, tmp_path, figure):
     assert np.mean(np.abs(off) < 1) > int(least) / 100
 
 
+@pytest.mark.slow
 def test_the_budget_has_seams_that_no_column_meets(tmp_path):
     """Closed form: a smooth wall tells of no seam, and 0.20 mm of the mean radius are assumed."""
     shape = wall_of([], courses=3)

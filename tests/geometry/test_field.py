@@ -429,6 +429,7 @@ def test_a_buckle_is_wall(figure):
         assert abs(ppm) < 60
 
 
+@pytest.mark.slow
 def test_order_turn_and_size_change_nothing():
     rng = np.random.default_rng(8)
     sites = sites_of(3, [-0.5, 0.5], 12, rng)
@@ -489,6 +490,7 @@ def test_walls_drawn_from_the_components_are_held(figure):
     assert abs(part - 0.95) < 3 * np.sqrt(0.95 * 0.05 / 2000)
 
 
+@pytest.mark.slow
 def test_more_rings_and_points_narrow_the_doubt():
     """Monotony: of one wall, in the mean over courses."""
 
@@ -579,6 +581,7 @@ def test_a_field_of_cells_has_the_volume_of_the_field_of_points(tmp_path, monkey
     assert 0.8 < u[1] / u[0] < 1.5  # means tell less of narrow seams
 
 
+@pytest.mark.slow
 def test_known_welds_tell_peaks_from_the_wall_between(figure):
     """Every third of 24 generatrices stands on a weld that peaks by 10 mm: volume of the wall.
 

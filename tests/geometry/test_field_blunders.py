@@ -243,6 +243,7 @@ def peaked(rng, alone):
     return sites, radius + 0.010 * peak, peak
 
 
+@pytest.mark.slow
 def test_peaks_at_welds_are_wall_and_a_point_alone_is_none():
     """What three rings agree on stays; the same 10 mm at one point of a smooth wall goes."""
     rng = np.random.default_rng(3)

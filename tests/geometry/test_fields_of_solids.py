@@ -111,6 +111,7 @@ def test_cap_integrals_are_those_of_a_quadrature():
         assert cap_integrals(np.array([cosine]))[0] == pytest.approx(expected, abs=1e-10)
 
 
+@pytest.mark.slow
 def test_functionals_of_a_sphere_are_those_of_points_on_it():
     """Second method: a cap as many points on it, with the covariance between places."""
     rng = np.random.default_rng(4)

@@ -295,7 +295,7 @@ def test_turned_points_give_the_turned_cylinder():
 # the start, and what is refused
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("span_deg", [30, 45, 90, 180, 360])
 def test_cylinders_of_any_direction_and_coverage_are_found(span_deg, figure):
     """A third to 16 radii long, 12 to 1500 points, noise to 0.3 % of the radius."""

@@ -27,7 +27,7 @@ def clutter(rng, n=60):
     return np.vstack([near, [[33.0, 21.0, 12.4], [30.0, 20.0, 12.9], [60.0, 60.0, 1.4]]])
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("tilt", [(0.0, 0.0), (0.002, -0.001), (0.03, 0.0)])
 def test_clutter_is_separated_and_tilt_found(tilt):
     rng = np.random.default_rng(7)
@@ -76,6 +76,7 @@ def test_a_single_blunder_is_found_by_its_normalised_residual():
     assert find_shell(xyz, JOINTS, 6.5, snooping=False).reason[17] == ""
 
 
+@pytest.mark.slow
 def test_a_repeated_place_counts_once():
     xyz = wall(np.random.default_rng(10), n=200)
     shell = find_shell(np.vstack([xyz, xyz[3]]), JOINTS, 6.5)
@@ -120,6 +121,7 @@ def test_heights_belong_to_courses():
     assert list(course_of([1.99, 2.0, 3.89, 3.91, 11.5, 11.51], JOINTS)) == [0, 0, 0, 1, 4, 4]
 
 
+@pytest.mark.slow
 def test_one_level_of_points_leaves_the_shell_upright():
     """The z noise of a single ring would be a tilt of any size."""
     rng = np.random.default_rng(13)
@@ -206,6 +208,7 @@ def test_a_barrel_of_three_rings_keeps_its_points():
     assert barrel.noise_m == pytest.approx(0.001, rel=0.15)
 
 
+@pytest.mark.slow
 def test_nozzle_and_stair_are_rejected_with_unequal_rings():
     """Six treads at heights of their own, 20 to 45 mm off, and the rim of a nozzle 30 mm off."""
     azimuth = np.linspace(1.0, 1.8, 6)

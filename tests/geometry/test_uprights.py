@@ -94,6 +94,7 @@ def test_form_is_not_marked(form):
     assert not np.any(marked(FORMS[form])[0])
 
 
+@pytest.mark.slow
 def test_waves_of_a_tenth_of_a_metre_are_not_marked():
     assert not np.any(marked(lambda sites: np.zeros(len(sites)), wavy_m=0.1)[0])
 
@@ -106,7 +107,7 @@ def with_pipes(rng, wall, *, points, rings, off_m, count):
     return put_before(rng, measured, wall, pipes, inside=True)
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("far", [True, False])
 def test_pipes_of_every_ring_are_within_u(far, tmp_path, figure):
     """Before, all were kept: of 100 mm 1338 ppm too small, U 1239; of 60 mm 784 and 785."""

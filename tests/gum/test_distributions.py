@@ -133,7 +133,7 @@ def test_the_characteristic_function_is_the_mean_cosine(one):
     assert one.characteristic(-4.0) == one.characteristic(4.0)
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("dof", [1, 2.4, 5, 40, 1e4])
 def test_the_characteristic_function_of_students_t(dof):
     """Second method: Fourier integral of the density by quadrature; exp(-|t|) for one dof."""

@@ -312,6 +312,7 @@ def test_law_of_an_input_with_little_beside_it(one, share):
         assert below == pytest.approx(level, abs=3e-5)
 
 
+@pytest.mark.slow
 def test_law_of_two_arc_sines_and_a_normal_against_plain_draws():
     """Simulation: the law's quantiles within 4 standard errors of 1e6 plain draws."""
     inputs = [UShaped(1.0), UShaped(2.0), Normal(0.2), Triangular(0.5)]

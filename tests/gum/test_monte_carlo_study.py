@@ -181,6 +181,7 @@ def test_plain_draws_take_over_where_the_parabola_turns(figure):
     assert np.all(found.high > found.low)
 
 
+@pytest.mark.slow
 def test_uncorrelated_control_variate_is_harmless(figure):
     """Comparison loss at x1 = 0.5 u, r = 0: scatter over batches with and without the control."""
 

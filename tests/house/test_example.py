@@ -49,6 +49,7 @@ def test_no_point_is_rejected(example_result):
     assert len(example_result.wall.accepted) == 24 * 5 - 1  # published: section 3 has 23 points
 
 
+@pytest.mark.slow
 def test_warnings_name_the_sections_alone(example_result):
     """Nobody signs the example, so that it is a draft; the published scatter is not even."""
     codes = [one.expected.code for one in example_result.warnings]
@@ -73,6 +74,7 @@ def reconstruct(folder, *options):
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout
 
 
+@pytest.mark.slow
 def test_the_script_writes_the_same_points_again(tmp_path):
     reconstruct(tmp_path)
     assert (tmp_path / "points.csv").read_bytes() == (EXAMPLE / "points.csv").read_bytes()

@@ -260,6 +260,7 @@ def test_a_validated_interval_does_not_reach_below_an_empty_tank():
     assert exact.by_gum[0]
 
 
+@pytest.mark.slow
 def test_a_row_that_is_not_in_its_interval_is_never_written(tmp_path):
     """What the simulation says of a row is refused as a whole, not printed."""
     parts = KINDS["sphere"] | {"uncertainty": DATUM}

@@ -83,6 +83,7 @@ def test_other_tags_are_none(checkout):
     assert asked(checkout).startswith("0.4.0.dev1+g")
 
 
+@pytest.mark.slow
 def test_a_checkout_without_tags_names_its_commit(checkout, tmp_path):
     commit(checkout)
     head = commit(checkout)
@@ -91,6 +92,7 @@ def test_a_checkout_without_tags_names_its_commit(checkout, tmp_path):
     assert asked(tmp_path / "shallow") == f"0.4.0.dev1+g{head}"
 
 
+@pytest.mark.slow
 def test_without_git_or_anything_nothing_is_claimed(checkout):
     assert asked(checkout, PATH="/nowhere") == "0.4.0.dev0+unknown"
     shutil.rmtree(checkout / ".git")
@@ -155,6 +157,7 @@ def test_importing_asks_nobody():
     assert done.stdout.split() == ["False", "False"]
 
 
+@pytest.mark.slow
 def test_the_command_says_it():
     done = subprocess.run(
         [sys.executable, "-m", "tankcal", "--version"], capture_output=True, text=True, check=True

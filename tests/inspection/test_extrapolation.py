@@ -76,6 +76,7 @@ def test_exact_readings_have_no_bias():
     assert found.u < 1e-6
 
 
+@pytest.mark.slow
 def test_turning_the_tank_changes_no_estimate():
     """Property: the draws start at the farthest point, wherever azimuth 0 lies."""
     z = np.random.default_rng(8).normal(0, 3e-3, N)

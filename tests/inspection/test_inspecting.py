@@ -152,6 +152,7 @@ def test_a_wall_of_straps_is_not_determined():
     assert not found.levels
 
 
+@pytest.mark.slow
 def test_mean_radii_as_nominal_take_off_what_all_share():
     """Closed form: departures from the mean of a level have the mean zero."""
     found = inspect_files(Asked(EXAMPLE, nominal="mean"))
@@ -171,6 +172,7 @@ def test_foreign_folders_are_left_alone(tmp_path, capsys):
     assert [one.name for one in tmp_path.iterdir()] == ["mine.txt"]
 
 
+@pytest.mark.slow
 def test_json_is_what_is_saved(capsys, kept):
     assert main(["inspect", str(kept), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)

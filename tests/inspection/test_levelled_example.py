@@ -53,6 +53,7 @@ def test_shipped_limits_are_not_said_to_be_verified():
         assert rule[name]["clause"]
 
 
+@pytest.mark.slow
 def test_settlement_of_the_example(truth):
     """Truth: the planted waves; each difference within U of it, none of the epochs alone."""
     log = Log()

@@ -273,6 +273,7 @@ def warned(epochs, strength=TANK_A):
     return of
 
 
+@pytest.mark.slow
 def test_an_odd_number_and_wide_gaps_are_told(tmp_path):
     without = {n: p for n, p in POINTS.items() if n not in ("P4", "P5")}
     assert warned({"1": without})(tmp_path)[0] == ["levels_wide_gaps"]
@@ -296,6 +297,7 @@ def test_two_epochs_of_different_points(tmp_path):
     assert (told, labels) == (["levels_alone"], {"a", "b", "b - a"})
 
 
+@pytest.mark.slow
 def test_another_datum_is_told(tmp_path):
     raised = {n: (t, z + 40) for n, (t, z) in POINTS.items()}
     assert warned({"a": POINTS, "b": raised})(tmp_path)[0] == ["levels_other_datum"]

@@ -210,6 +210,7 @@ def test_curvature_of_uneven_points_is_the_planted_one():
     assert_allclose(found.azimuth_rad, grid[np.argmax(np.abs(planted))], atol=2e-4)
 
 
+@pytest.mark.slow
 def test_a_plane_changes_nothing():
     """Property: whatever plane is added, all that is out of it stays; it turns with the tank."""
     azimuth, z = uneven(20, 5), np.random.default_rng(2).normal(0, 5, 20)
@@ -330,6 +331,7 @@ def test_no_uncertainty_is_known():
     assert round(found["settlement_all"].value, 2) == 4.81
 
 
+@pytest.mark.slow
 def test_level_points_say_nothing_of_the_cosine():
     """Errors alone: R2 is not determined in about 95 of 100 (the level of the test)."""
     rng = np.random.default_rng(12)
@@ -340,6 +342,7 @@ def test_level_points_say_nothing_of_the_cosine():
     assert figures(epoch_of(A_MM), TANK_A)["settlement_cosine"].at_least
 
 
+@pytest.mark.slow
 def test_level_points_have_the_uncertainty_of_any_others():
     """Property: U of what is linear in the elevations is not of the elevations."""
     flat, others = (figures(epoch_of(z), TANK_A) for z in (np.full(16, 12100.1), A_MM))
@@ -382,6 +385,7 @@ def levelled(*epochs):
     return Levelling("settlement.csv", epochs, True, np.inf, None)
 
 
+@pytest.mark.slow
 def test_a_difference_takes_out_how_the_tank_was_built():
     """Closed form: what was built cancels, errors add up as their squares."""
     built = 6 * np.random.default_rng(4).normal(0, 1, 16)

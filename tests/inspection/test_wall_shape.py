@@ -87,6 +87,7 @@ def test_plumb_and_radii_of_a_known_wall(folder):
     np.testing.assert_allclose(centres - centres[0], np.array(truth) - truth[0], atol=3e-6)
 
 
+@pytest.mark.slow
 def test_u_of_what_was_read_is_that_of_readings(folder):
     """Closed form: two readings of 1 mm make 1.414 mm of plumb; 24 of a ring 0.289 of its centre.
 
@@ -226,6 +227,7 @@ def test_u_covers_walls_of_other_families(folder, figure):
     assert np.mean(np.concatenate(list(passed.values()))) <= 0.04
 
 
+@pytest.mark.slow
 def test_low_level_is_added_where_none_was_read(folder):
     """Property: 0.3 m above the bottom is judged, estimated unless a level is within 5 cm of it."""
     measured = survey(np.random.default_rng(2), cylinder(), rings=1, points=16, noise_m=1e-4)

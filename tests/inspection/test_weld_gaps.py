@@ -69,6 +69,9 @@ def _upright(found):
     return [one for one in found.gaps if one.kind == "peaking"]
 
 
+SLOW_FIXTURES = {"shell", "scanned", "found"}
+
+
 @pytest.fixture(scope="module")
 def shell():
     return PeakedShell(peaks=PEAKS, bands=[Band(1.2, 5.5, -0.008, 0.2)], **SMALL)
@@ -213,6 +216,7 @@ def _with_nozzle(rng, cloud, azimuth, z, radius_m, off_m):
     return cloud * np.column_stack([near, near, np.ones(len(cloud))])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("off_m", [0.03, pytest.param(0.15, marks=pytest.mark.slow)])
 def test_nozzle_before_a_weld_is_no_peak(off_m):  # truth: the wall behind it
     rng = np.random.default_rng(4)
@@ -315,6 +319,7 @@ def test_found_weld_is_that_which_was_given():  # property
 # What is not determined.
 
 
+@pytest.mark.slow
 def test_sparse_cloud_determines_nothing():  # 250 points in each square metre
     shell = PeakedShell(radius_m=3.0, courses=2, course_m=2.0, peaks=PEAKS)
     found = _gaps(shell, [_cloud(shell, density=250)])

@@ -25,6 +25,7 @@ from tankcal.products.intercomparison.scoring import score_folders
 from tankcal.products.intercomparison.tank import tank_of
 
 
+@pytest.mark.slow
 def test_commitment_is_the_hash_of_the_file(tmp_path):
     _, truth, manifest, _ = written_package(tmp_path)
     assert manifest["truth_sha256"] == hashlib.sha256(truth.read_bytes()).hexdigest()

@@ -143,7 +143,7 @@ def test_the_unit_of_a_name(name, stem, unit):
 # ---- the sheets
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "survey", "language"), FORMS_IN_LANGUAGES)
 def test_empty_form_reports_only_what_is_missing(tmp_path, kind, survey, language):
     """Property: explanations and examples, in any language, are not read."""
@@ -180,7 +180,7 @@ def test_empty_form_reports_only_what_is_missing(tmp_path, kind, survey, languag
     assert others == empty
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "survey"), FORMS)
 def test_every_column_has_its_heading_unit_note_example_and_rule(tmp_path, kind, survey):
     path = write_input_workbook(tmp_path / "tank.xlsx", kind, survey)
@@ -402,7 +402,7 @@ MISTAKES = [
 ]
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("change", "place", "words"), MISTAKES)
 def test_each_mistake_names_its_sheet_and_cell(form, change, place, words):
     told = [str(problem) for problem in spoilt(form, change)]
@@ -434,6 +434,7 @@ def test_a_date_that_is_none(form, value, words):
     assert words in problem.expected
 
 
+@pytest.mark.slow
 def test_all_mistakes_come_in_one_run(form):
     def change(book):
         set_cell("courses", "D11", "12 mm")(book)

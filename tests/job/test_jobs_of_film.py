@@ -178,6 +178,7 @@ def gathered_from(folder, parts):
     return gather(load(write_folder(folder, parts)).measurements)
 
 
+@pytest.mark.slow
 def test_readings_beyond_the_limit_are_rejected_and_listed(tmp_path):
     """Closed form: 0, -s, s, -s has the sample sd s sqrt(11/12)."""
     found = gathered_from(tmp_path / "a", repeated(20.0, 8.0))
@@ -402,6 +403,7 @@ def warnings_of(folder, parts, file=FILES):
     return lines([one for one in warnings if one.file == file])
 
 
+@pytest.mark.slow
 def test_warnings_about_marks(tmp_path):
     assert warnings_of(tmp_path / "sound", read_on_comparator(survey_parts())) == []
     parts = read_on_comparator(survey_parts())

@@ -51,6 +51,7 @@ def test_as_many_lines_as_allowed_are_counted_with_and_without_a_last_end():
         assert folder.has_too_many_lines("", text, Log()) == text.endswith("a")
 
 
+@pytest.mark.slow
 def test_a_heading_of_a_million_columns(tmp_path):
     job = shutil.copytree(EXAMPLE, tmp_path / "job")
     row = ",".join(["1"] * 1_000_000)

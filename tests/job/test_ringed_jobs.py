@@ -48,7 +48,7 @@ def test_folder_and_workbook_give_the_same(tmp_path):
     ]
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_starter_filled_in_is_the_job(tmp_path, language):
     """The workbook of `tankcal new`, filled in, against the folder of the same job."""

@@ -259,6 +259,7 @@ def test_both_forms_filled_in_give_the_same_job(starter):
     assert_same_job(folder, workbook)
 
 
+@pytest.mark.slow
 def test_the_workbook_helps_to_fill_it_in(tmp_path):
     book = openpyxl.load_workbook(write_input_workbook(tmp_path / "job.xlsx"))
     tables = ["points", "courses", "welds", "bottom", "deadwood", "uncertainty"]
@@ -380,7 +381,7 @@ def test_every_comment_of_the_text_files_is_in_the_language(tmp_path, language, 
     assert shared == ["tankcal run ."]
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES)
 @pytest.mark.parametrize("kind", KINDS)
 def test_forms_have_the_sizes_of_the_drawing(tmp_path, language, kind):

@@ -117,6 +117,7 @@ def test_tables_made_by_linear_interpolation_have_no_faults(shape):
     assert examine(heights / 0.001, np.round(rough / 0.001), 0 * heights).faults == ()
 
 
+@pytest.mark.slow
 def test_sums_of_rounded_steps_have_no_faults():
     """Accumulated rounding is bad practice but no slip: the table is judged by its own noise."""
     steps = np.round(np.diff(lying(table_heights(0.01, 2.4))), 3)
@@ -688,7 +689,7 @@ def leaning(diameter, length, tilt, place):
     return litres
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("tank", LEANING)
 def test_a_leaning_tank_dipped_near_its_low_end_is_sound(tank, tmp_path):
     rows = [f"{k / 10:.1f},{v:.0f}" for k, v in enumerate(leaning(*tank))]
@@ -855,6 +856,7 @@ def with_parts(parts, heading="Partes proporcionais\nmm;litros"):
     return "Altura (cm);Volume (litros)\n" + pairs() + f"\n{heading}\n" + lines
 
 
+@pytest.mark.slow
 def test_proportional_parts(tmp_path):
     assert found(lint_text(tmp_path, with_parts(PARTS))) == {}
     assert found(lint_text(tmp_path, with_parts(PARTS, "mm;L"))) == {}

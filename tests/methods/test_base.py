@@ -50,6 +50,7 @@ def test_other_surveys_have_no_method():
     assert methods_for(None) == ()
 
 
+@pytest.mark.slow
 def test_a_method_of_another_distribution(tmp_path):
     """An entry point is sufficient for a table of a job, a survey and its uncertainty."""
     bare = {"sphere.diameter_m": None, "table.step_m": 0.5}

@@ -55,6 +55,7 @@ def refused(folder, parts):
 # ---- exact recovery
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("setups", [1, 2])
 @pytest.mark.parametrize("kind", ["horizontal", "sphere"])
 def test_readings_without_noise_give_the_exact_volume(kind, setups, tmp_path):
@@ -64,6 +65,7 @@ def test_readings_without_noise_give_the_exact_volume(kind, setups, tmp_path):
     assert len(result.scan.accepted) == 120
 
 
+@pytest.mark.slow
 def test_the_offset_scale_and_angles_of_the_set_up_are_applied(tmp_path):
     """A correction of the instrument, and gon with a turned circle, change nothing."""
     parts = exact_parts("sphere", tool=Tool(offset_m=0.03))
@@ -98,6 +100,7 @@ def test_hits_on_the_flat_ends_are_rejected(tmp_path):
 # ---- uncertainty
 
 
+@pytest.mark.slow
 def test_the_causes_of_the_instrument_are_sources_of_their_own(tmp_path):
     """From near the centre of a sphere, an offset e changes V by its area times e."""
     solid, rng = Ball(5.0), np.random.default_rng(5)
@@ -112,6 +115,7 @@ def test_the_causes_of_the_instrument_are_sources_of_their_own(tmp_path):
     assert "offset" not in result.body.undeclared()
 
 
+@pytest.mark.slow
 def test_incidence_is_the_angle_to_the_normal_of_the_solid(tmp_path):
     result = run(tmp_path, exact_parts("sphere"))
     sighting = result.sights["inside_hits"]
@@ -218,6 +222,7 @@ def test_an_offset_that_is_not_declared_is_refused(kind, setups, tmp_path):
     assert "tape" not in line
 
 
+@pytest.mark.slow
 def test_the_offset_may_be_free_if_a_network_determines_it(tmp_path):
     parts = exact_parts("sphere", 2, declared={"u_offset_mm": "free"})
     result = run(tmp_path, parts)
@@ -243,6 +248,7 @@ def test_a_set_up_that_no_network_reads_is_refused(tmp_path):
     assert line.startswith("setups.csv, row 3, setup: found 'I2', which is tied")
 
 
+@pytest.mark.slow
 def test_a_set_up_outside_the_wall_is_refused(tmp_path):
     rng = np.random.default_rng(5)
     (line,) = refused(tmp_path, parts_of(Ball(5.0), [(8.0, 0.0, 0.0)], rng, noisy=False))
@@ -282,6 +288,7 @@ def test_bad_cells_are_named_by_row_and_column(tmp_path):
 # ---- warnings and papers
 
 
+@pytest.mark.slow
 def test_hits_on_a_part_of_the_cylinder_are_warned_of(tmp_path):
     parts = exact_parts("horizontal", hits=400)
     head, *rows = parts.tables["wall_hits"]

@@ -104,7 +104,7 @@ LEANING = {  # name: (radius, azimuths of a ring, how far they scatter, rings, s
 }
 
 
-@pytest.mark.slow(after=3)
+@pytest.mark.slow
 @pytest.mark.parametrize("lean", [0.036, 0.05])
 @pytest.mark.parametrize("case", LEANING)
 def test_a_leaning_cylinder_comes_out_exactly(tmp_path, lean, case):

@@ -120,6 +120,7 @@ def test_no_job_and_nothing_to_adjust(job, survey):
         run(twice)
 
 
+@pytest.mark.slow
 def test_no_capacity_without_a_vertical(job, survey):
     loose = measurements(survey, by_tape(survey), settings=INNER)
     with pytest.raises(SolutionError, match=r"the vertical is not determined.*plumb lines"):

@@ -127,6 +127,7 @@ def test_workers_change_no_byte_of_the_inside(client, placing):  # invariance
     assert sum(len(one.points()) for one in ours) > 0
 
 
+@pytest.mark.slow
 def test_chunks_change_no_byte(placing, monkeypatch):  # invariance: no rounding hangs on a number
     whole = JobPasses(placing)
     from tankcal.methods.clouds import passes as cloud_passes

@@ -837,6 +837,7 @@ def test_straps_that_are_only_compared(tmp_path):
     assert problems_of(tmp_path / "a", parts) == [("instruments.toml", 1, "TS.u_offset_mm")]
 
 
+@pytest.mark.slow
 def test_few_hits_and_levels_are_named(tmp_path):
     surface = Surface(circle, FOOT, SLOPE)
     rows = rows_of("I", take_hits(surface, STATION, even_aims(surface, (1.0, 3.0, 5.0, 7.0), 8)))

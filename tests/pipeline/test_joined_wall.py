@@ -89,7 +89,7 @@ def as_points(parts, sd_mm=(1.0, 0.7, 0.5), seed=4):
     return parts
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("inside", [False, True])
 def test_lines_beside_hits_agree_on_an_exact_wall(tmp_path, inside):
     """Exact geometry, on either side: nothing is rejected, and the plummet's lean comes out."""
@@ -164,7 +164,7 @@ def strapped_above(parts, radius=oval):
     return parts
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("tell", [plumbed, strapped_above])
 def test_one_ring_of_points_serves_where_lines_or_straps_tell_the_rest(tmp_path, tell):
     """Exact geometry: the ring tells the radius, lines or straps all other courses."""
@@ -199,7 +199,7 @@ def test_the_lean_of_lines_is_that_of_the_points(tmp_path):
     assert not list(check_leans(result.job, result.wall))
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("azimuth", "cause"), [
     (lambda i: -30 * i % 360, "leans_mirrored"), (lambda i: 30 * (i + 2) % 360, "leans_turned"),
 ])  # fmt: skip
@@ -307,7 +307,7 @@ def dense(result):
     return found, root @ root.T, columns
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seen", [lambda parts: parts, one_ring])
 def test_points_straps_and_offsets_are_one_dense_adjustment(tmp_path, seen):
     """Second method: estimates and covariances to 1e-9, linearised at the same place."""

@@ -120,6 +120,7 @@ def test_a_meter_that_nothing_checks_is_told(tmp_path, proved):
     assert any("leak below" in one for one in lines)  # no dip was read at rest
 
 
+@pytest.mark.slow
 def test_pose_of_a_lying_tank_from_dips_and_litres(tmp_path):
     """Published: liquid.md 3, from sizes that are 5 cm and 20 cm wrong, without tilt or zero."""
     dips = [0.1, 0.3, 0.5, 0.7, 0.9, 1.1, 1.3, 1.5, 1.7, 1.9, 2.1, 2.3, 2.35]
@@ -143,6 +144,7 @@ def test_pose_of_a_lying_tank_from_dips_and_litres(tmp_path):
     assert_allclose(sizes["diameter"].after, -0.05002, atol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["horizontal", "sphere"])
 def test_a_body_is_of_one_piece(tmp_path, kind):
     """The free surface is the derivative of the volume; sources give the table's u."""
@@ -158,6 +160,7 @@ def test_a_body_is_of_one_piece(tmp_path, kind):
     assert np.all(np.abs(volumes - NOMINAL[kind](levels)) < 4 * combine(sources, 7).u)
 
 
+@pytest.mark.slow
 def test_correlated_sizes(tmp_path):
     """Closed form: the columns of inputs that are correlated make the variance of their parts."""
     job = metered_job("horizontal", tmp_path / "job", dips=[0.2, 0.6, 1.0, 1.4, 1.8],
@@ -175,6 +178,7 @@ def test_correlated_sizes(tmp_path):
     assert np.all(np.abs(volumes - NOMINAL["horizontal"](levels)) < 0.05)
 
 
+@pytest.mark.slow
 def test_joint_body_of_a_shell(upright):
     survey = find_survey(upright, lambda text: None).survey
     measured = measure_by_liquid(upright, survey)
@@ -188,6 +192,7 @@ def test_joint_body_of_a_shell(upright):
     assert_allclose(measured.body.volume_m3(levels), slow, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_tables_for_two_densities_differ_by_the_head_of_the_shell(upright):
     """Nothing but the head depends on the liquid of the table: to a millilitre."""
     dense, light = replace(upright.table, liquid_density_kg_m3=850.0), upright.table

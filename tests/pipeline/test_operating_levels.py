@@ -43,6 +43,7 @@ def limits_of(job):
     return {row["tank_limit"]: row for row in limit_rows(record)}, record
 
 
+@pytest.mark.slow
 def test_volumes_are_those_of_the_cylinder(tmp_path):
     """The dip plate is 0.1 m above the bottom, so that each volume below a dip has 0.1 m more."""
     rows, _ = limits_of(job_with(tmp_path, **{"datum.dip_plate_z_m": 0.1}))
@@ -61,6 +62,7 @@ def test_volumes_are_those_of_the_cylinder(tmp_path):
         assert rows[code]["volume_m3"] == pytest.approx(AREA_M2 * height_m, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_errors_of_the_zero_cancel_between_two_levels(tmp_path):
     """The zero contributes A times 5 mm to a volume below a dip, and nothing to a difference."""
     rows, _ = limits_of(job_with(tmp_path))
@@ -73,6 +75,7 @@ def test_errors_of_the_zero_cancel_between_two_levels(tmp_path):
     assert 0.5 * of_wall < rows["working_capacity"]["U_m3"] < of_wall
 
 
+@pytest.mark.slow
 def test_U_of_a_difference_is_that_of_stated_csv(tmp_path):
     """The same dips in stated.csv have the same U, and are stated once unless they have a note."""
     asked = "9,1.2,,\n9,0.4,,by the terminal\n"
@@ -87,6 +90,7 @@ def test_U_of_a_difference_is_that_of_stated_csv(tmp_path):
     assert dips.count((0.4, 9.0)) == 1
 
 
+@pytest.mark.slow
 def test_levels_leave_the_default_statements(tmp_path):
     _, record = limits_of(job_with(tmp_path / "with"))
     without = to_plain(record_of(tankcal.run(job_with(tmp_path / "without", {}))))
@@ -95,6 +99,7 @@ def test_levels_leave_the_default_statements(tmp_path):
     assert "levels" not in without["job"]
 
 
+@pytest.mark.slow
 def test_only_given_levels_are_stated(tmp_path):
     levels = {"maximum_m": 9.0, "full_m": 9.0, "pump_suction_m": 0.4}
     rows, _ = limits_of(job_with(tmp_path, levels))
@@ -119,6 +124,7 @@ def test_a_level_that_is_refused(tmp_path, levels, column, words):
     assert words in problem.expected
 
 
+@pytest.mark.slow
 def test_a_level_above_the_computed_table_is_refused(tmp_path):
     """As for a scan, whose top is not known before the calculation."""
     job = job_with(tmp_path)
@@ -129,6 +135,7 @@ def test_a_level_above_the_computed_table_is_refused(tmp_path):
     assert "found 9.7; expected 0 to 9.5, the dips of the table" in problem.expected
 
 
+@pytest.mark.slow
 def test_a_level_in_the_critical_zone_is_marked(tmp_path):
     roof = {
         "roof.mass_kg": 9000.0,

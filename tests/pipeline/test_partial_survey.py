@@ -92,6 +92,7 @@ def computed(folder, parts):
     return tankcal.run(tankcal.load(write_folder(folder, parts)), simulated=False)
 
 
+@pytest.mark.slow
 def test_a_job_with_one_course_strapped_again(tmp_path):
     found = computed(tmp_path / "job", partial_parts()).radii
     update = found.updated.update
@@ -105,6 +106,7 @@ def test_a_job_with_one_course_strapped_again(tmp_path):
     assert_allclose(after, expected, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_straps_tell_nothing_of_courses_that_kept_their_former_radius(tmp_path):
     """Former radii are inside; a table of straps took them for outside ones, less plate again."""
     told = save_strapping(computed(tmp_path, partial_parts(("1", "3")))).courses
@@ -113,6 +115,7 @@ def test_the_straps_tell_nothing_of_courses_that_kept_their_former_radius(tmp_pa
     assert_allclose(inside, [RADII_M[0], RADII_M[2]], atol=1.5e-3)
 
 
+@pytest.mark.slow
 def test_the_top_row_has_the_covariance_of_the_radii(tmp_path):
     """All causes of the survey reach the table: at the top u is by the radii alone."""
     result = computed(tmp_path / "job", partial_parts())
@@ -223,6 +226,7 @@ def held_by_draws(folder, count, seed):
     return by_row, np.mean(np.abs(delivered) <= U, axis=0)
 
 
+@pytest.mark.slow
 def test_intervals_hold_in_the_declared_model(tmp_path, figure):
     rows, deliveries = held_by_draws(tmp_path / "job", 2000, seed=3)
     assert rows.min() > 0.93

@@ -74,7 +74,7 @@ def test_case_b(tmp_path):
     assert budget >= {"straps", "offsets", "instrument_scale", "bulge", "seams", "ovality"}
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("inside", [False, True])
 def test_leaning_courses_come_back(tmp_path, inside):
     """Exact geometry of a shell that leans by 2 %, read by a plummet that leans by 20 arcsec."""
@@ -83,6 +83,7 @@ def test_leaning_courses_come_back(tmp_path, inside):
     assert wall.collimations["ZL"][0] == pytest.approx(KAPPA, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_one_face_and_a_certificate(tmp_path):
     """The collimation is not known then: it goes into every radius, and into U."""
     parts = cones(faces=(1,))
@@ -97,6 +98,7 @@ def test_one_face_and_a_certificate(tmp_path):
     assert abs(source.columns_m3[-1, 0]) == pytest.approx(-by_lean, rel=0.005)
 
 
+@pytest.mark.slow
 def test_a_plummet_that_nobody_describes(tmp_path):
     parts = cones()
     del parts.registers["instruments"]["ZL"]
@@ -118,6 +120,7 @@ def test_a_given_collimation_is_weighted_with_both_faces(tmp_path):
     assert kappa == pytest.approx(free[0] * free[1] ** -2 / weight, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_two_plummets_and_a_misread_first_offset(tmp_path):
     """Each plummet keeps its own collimation, whichever reading is rejected."""
     parts = cones()
@@ -329,7 +332,7 @@ def told_of(parts, folder):
     return {one.expected.code for one in result.warnings if one.file not in ("job.toml",)}
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("code", PLANTED)
 def test_planted_errors_are_named(tmp_path, code):
     parts = cones(sd_m=3e-4)

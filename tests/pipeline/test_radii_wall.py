@@ -22,7 +22,7 @@ def computed(folder, parts):
     return tankcal.run(tankcal.load(write_folder(folder, parts)), simulated=False)
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("rho", [850.0, 0.0, 1000.0])
 def test_volumes_are_the_closed_form(tmp_path, rho):
     table = computed(tmp_path / "job", radii_parts(table__liquid_density_kg_m3=rho)).table
@@ -68,6 +68,7 @@ def test_a_barrel_moves_no_volume_at_a_joint(tmp_path):
     assert_allclose(lacking.reshape(5, 7) @ weights, 0, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_radii_of_another_temperature(tmp_path):
     warm = computed(tmp_path / "job", radii_parts(radii__reference_temperature_c=15.0))
     cold = computed(tmp_path / "other", radii_parts())
@@ -96,6 +97,7 @@ def test_a_full_covariance_is_that_of_the_table(tmp_path):
     assert_allclose(found.table.u_m3[-1], np.sqrt(girths @ matrix @ girths), rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_record_names_where_radii_come_from(tmp_path):
     result = computed(tmp_path / "job", radii_parts(radii__note="certificate 1234/2009"))
     record = tankcal.record.record_of(result)

@@ -121,6 +121,7 @@ def test_a_ring_is_assumed_to_bulge_less_than_a_course_of_a_large_tank(tmp_path)
     assert grown == pytest.approx(1.8 / 0.8, rel=0.1)
 
 
+@pytest.mark.slow
 def test_ovality_moves_the_middle_and_hardly_the_top(tmp_path):
     """Property: a wave has no area to the first order; the bottom that dips count from moves."""
     result = result_of(ringed_parts(shell__shape_sd_mm=3.0, horizontal__tilt_mm_per_m=0), tmp_path)
@@ -146,6 +147,7 @@ def test_a_tape_on_a_warm_shell_nearly_cancels(tmp_path):
     assert abs(line.contribution) < 0.4 * 2 / np.sqrt(3) * 3 * 1.1e-5 * warm.at(1.2).value_m3
 
 
+@pytest.mark.slow
 def test_sag_under_the_tank_is_taken_off(tmp_path):
     """Truth: a tape of 0.1 N/m at 50 N over 4 m: w^2 L^3 / (24 F^2) longer."""
     parts = ringed_parts()
@@ -226,6 +228,7 @@ def test_record_states_rings_and_what_no_dip_reads(tmp_path):
     assert all(0 < one["radius_sd_m"] < 2e-3 for one in rings)
 
 
+@pytest.mark.slow
 def test_a_single_reading_is_told(tmp_path):
     parts = ringed_parts()
     del parts.tables["circumferences"][2]

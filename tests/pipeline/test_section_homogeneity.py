@@ -78,6 +78,7 @@ def test_an_estimated_covariance_is_compared_with_nothing(tmp_path):
     assert codes_of(job) == ["sections_inhomogeneous"]
 
 
+@pytest.mark.slow
 def test_points_that_scatter_less_than_stated_are_named(tmp_path):
     """A stated sd ten times too large; scatter of rounding errors is no variance of a section."""
     rng = np.random.default_rng(1)
@@ -90,6 +91,7 @@ def test_points_that_scatter_less_than_stated_are_named(tmp_path):
 # ---- one rule for all outlines
 
 
+@pytest.mark.slow
 def test_a_missing_point_leaves_every_outline_to_the_same_estimator(tmp_path):
     """Section 2 without a generatrix: neither it nor its neighbours change their estimator.
 
@@ -174,7 +176,7 @@ def drawn_job(seed, folder, factor=1.0, noises=(0.0003, 0.001, 0.002, 0.004, 0.0
     return job_of(wall, measured, folder, given=bool(rng.random() < 0.8))
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [5019, 5196, 5319], ids=["buckle", "coil", "buckle of 0.3 mm"])
 def test_form_that_the_model_lacks_is_no_noise(seed, tmp_path):
     """A buckle in one course is far from the form of the others; the noise is 0.3 or 1 mm."""

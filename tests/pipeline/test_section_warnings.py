@@ -33,6 +33,7 @@ def test_gaps(tmp_path, courses, codes):
     assert [code for code, _ in found] == codes
 
 
+@pytest.mark.slow
 def test_gaps_of_all_name_the_first_and_how_many(tmp_path):
     ((_, text),) = told(tmp_path, lambda one: one.azimuth_rad < 5.0)
     assert text == (

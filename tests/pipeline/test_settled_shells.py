@@ -79,6 +79,7 @@ def short_waves(rng, *, radius_m, courses, top_m):
     return shell
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_a_short_wave_of_settlement_in_a_gap_is_within_U(tmp_path, seed, figure):
     """Simulation: 10 mm; seed 0 was 2.8 U off while waves above 6 were left out."""
@@ -92,6 +93,7 @@ def test_a_short_wave_of_settlement_in_a_gap_is_within_U(tmp_path, seed, figure)
     assert beyond.max() < 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [3, 5, 7])
 def test_valid_stations_round_short_waves_are_taken(tmp_path, seed):
     """Simulation: refused as exchanged while waves above 6 were left out."""
@@ -136,6 +138,7 @@ def test_blank_stations_that_do_not_settle_are_refused(shared, tmp_path):
         tankcal.run(tankcal.load(folder))
 
 
+@pytest.mark.slow
 def test_places_that_do_not_settle_are_refused(tmp_path, monkeypatch):
     """Without passes, places known to 0.1 m are off by more than the limit."""
     monkeypatch.setattr("tankcal.methods.hits.wall.ROUNDS", 0)

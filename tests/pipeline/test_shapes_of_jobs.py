@@ -122,7 +122,7 @@ TOPS = {
 }
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("form", BOTTOMS)
 def test_upright_tanks_on_heads_run_to_the_table(tmp_path, form):
     """Closed forms of `tips`, proved there; the dip plate at the lowest point."""
@@ -139,7 +139,7 @@ def test_upright_tanks_on_heads_run_to_the_table(tmp_path, form):
     assert set(inputs) <= {one.kind for one in found.table.sources}
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("form", TOPS)
 def test_upright_tanks_with_heads_on_top_run_to_the_table(tmp_path, form):
     sizes, given, inputs = TOPS[form]

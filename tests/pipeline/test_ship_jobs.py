@@ -53,6 +53,7 @@ def result_of(folder, mesh=None, settings=None, uncertainty=UNCERTAINTY):
     return tankcal.run(tankcal.load(folder), simulated=False)
 
 
+@pytest.mark.slow
 def test_box_of_a_job(tmp_path):
     """Closed form: x tan(trim) + y tan(list) of an upright pipe, to the micrometre."""
     ship = result_of(tmp_path / "job", settings={"ship.pipe_top_m": [-5.5, -2.5, 6.0]}).ship
@@ -62,6 +63,7 @@ def test_box_of_a_job(tmp_path):
     assert found == pytest.approx(np.broadcast_to(expected[..., None], found.shape), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_table_is_that_of_the_mesh(tmp_path):
     """Second method: the same mesh without [ship] and its zero at the pipe's lower end."""
     upright = {"ship.pipe_top_m": [-5.5, -2.5, 6.0]}
@@ -140,6 +142,7 @@ def test_contraction_shrinks_the_tank(tmp_path):
     assert u == pytest.approx(2 * 0.0002, rel=0.02)  # at a fixed sounding: 3 V - s A, here 2 V
 
 
+@pytest.mark.slow
 def test_inputs_that_only_corrections_have_are_named(tmp_path):
     warnings = [str(one) for one in result_of(tmp_path / "job", uncertainty=()).warnings]
     (undeclared,) = [one for one in warnings if "not declared" in one]
@@ -162,6 +165,7 @@ def test_the_soundings_end_with_the_full_tank_or_the_pipe(tmp_path):
     assert np.array_equal(np.isnan(longer.correction_m), longer.state != "")
 
 
+@pytest.mark.slow
 def test_no_sounding_has_a_correction(tmp_path):
     """A step beyond the tank, where a dry pipe hides less than at even keel."""
     settings = {
@@ -185,6 +189,7 @@ BAD = [
 ]
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(("changes", "place", "words"), BAD)
 def test_a_pipe_that_does_not_fit_the_mesh(tmp_path, changes, place, words):
     with pytest.raises(InputError) as caught:

@@ -334,6 +334,7 @@ def test_a_bottom_measured_by_liquid_goes_with_the_dips(tmp_path):
     assert result.table.area_m2[above][1:-1] == pytest.approx(area[1:-1], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_an_error_that_no_tank_can_have_takes_a_smaller_step(tmp_path):
     """A conical end 50 mm deep with u 60 mm: moved by u it would bulge the other way."""
     settings = {"horizontal.end_a": "conical", "horizontal.end_a_depth_m": 0.05}

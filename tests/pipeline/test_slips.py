@@ -314,7 +314,7 @@ OF_KIND = [
 ]  # fmt: skip
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_plausible_job_has_no_warning(tmp_path, kind):
     assert implausible(told(tmp_path / "job", sound(kind))) == {}
@@ -335,20 +335,20 @@ def test_random_realistic_jobs_have_no_warning(tmp_path):
     assert alarms == []
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("slip", "code", "key"), OF_ALL)
 @pytest.mark.parametrize("kind", STEEL)
 def test_slips_of_every_kind(tmp_path, kind, slip, code, key):
     assert_told(tmp_path, sound(kind, **slip), code, key)
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "slip", "code", "key"), OF_KIND)
 def test_a_slip_of_a_kind(tmp_path, kind, slip, code, key):
     assert_told(tmp_path, sound(kind, **slip), code, key)
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("miss_m", [-0.6, 0.8])
 def test_a_bottom_that_leaves_a_ring_beyond_the_shell(tmp_path, miss_m):
     """The rings lie 0.55 m above the bottom and 0.4 m below the top; nothing else tells."""
@@ -393,6 +393,7 @@ def test_doubtful_input_is_on_first_page_and_last_in_terminal(tmp_path, capsys):
     assert "blocks.result(" in sources[place - 1]
 
 
+@pytest.mark.slow
 def test_certificate_without_doubts_has_no_doubtful_section(tmp_path):
     result = tankcal.run(tankcal.load(write_folder(tmp_path / "job", sound("sphere"))))
     assert certificate.doubtful_input(Paper(record_of(result))) == []
@@ -401,7 +402,7 @@ def test_certificate_without_doubts_has_no_doubtful_section(tmp_path):
 # ---- a survey
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "within", "without"),
     [

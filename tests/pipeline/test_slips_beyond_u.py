@@ -194,7 +194,7 @@ def test_a_slip_beyond_two_u_by_any_method(tmp_path, example, name, slip, expect
     assert_outcome(tmp_path, example, slip, expected)
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "example",
     ["strapping", "partial", "liquid-lying", "silva-1995", "rings", "sphere-straps", "ship",

@@ -50,6 +50,7 @@ def test_standard_deviations_that_nobody_reads_are_asked_about(tmp_path):
     assert "sd_below_any_mm" in {one.expected.code for one in job.warnings}
 
 
+@pytest.mark.slow
 def test_standard_deviations_of_an_instrument_in_other_units_are_refused(tmp_path):
     book = book_of("hits", 1002)
     name = "ET-5"
@@ -100,7 +101,7 @@ def test_decimal_degrees_are_rarely_as_packed_ones():
     assert chance_of_packed(np.arange(0.5, 40)) == 1.0  # says nothing
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("half", [(0, 180), (90, 270), (180, 360)])
 def test_hits_over_half_a_circle_are_in_the_unit_that_they_are_in(tmp_path, half):
     book = book_of("hits", 1002)
@@ -110,6 +111,7 @@ def test_hits_over_half_a_circle_are_in_the_unit_that_they_are_in(tmp_path, half
     refuse_other_units(tankcal.load(write_folder(tmp_path, book.parts())).hits)
 
 
+@pytest.mark.slow
 def test_degrees_in_a_column_of_gon_are_refused_by_name(tmp_path):
     book = book_of("hits", 1002)
     for row in book.tables["wall_hits"]:
@@ -163,7 +165,7 @@ def test_a_sound_line_of_hits_is_taken():
     refuse_misread_lines(line_of_hits(lambda zenith, distance: (zenith, distance)))
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["hits", "three set-ups"])
 def test_hits_in_feet_are_refused_by_the_heights_of_their_courses(tmp_path, kind):
     book = book_of(kind, 1002)

@@ -27,6 +27,7 @@ def example():
     return tankcal.run(tankcal.load(EXAMPLE_OF_SPHERE), simulated=False)
 
 
+@pytest.mark.slow
 def test_published_volume_of_three_circles(tmp_path):
     """Published example: 62.8512, 62.8431 and 62.8467 m hold 4191.8202 m3."""
     circles = {"E": (None, 62.8512), "M0": (0, 62.8431), "M90": (90, 62.8467)}
@@ -42,6 +43,7 @@ def test_published_volume_of_four_circles(tmp_path):
     assert not codes(found) & {"few_meridians", "meridians_uneven", "circle_contradicts"}
 
 
+@pytest.mark.slow
 def test_equal_circles_are_the_sphere_of_a_diameter(tmp_path):
     """Second method: a job of the diameter, today's sphere, row by row."""
     length = 20 * np.pi
@@ -61,6 +63,7 @@ def test_published_partial_volumes(tmp_path):
     assert [found.at(dip).value_m3 for dip in DIPS] == pytest.approx(published, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_volumes_of_an_ellipsoid_by_chains_and_rings(tmp_path):
     """Second method: chains of chords round an ellipsoid askew, its volume by level rings."""
     axes, dip = (10.006, 9.998, 9.991), 6.0
@@ -150,6 +153,7 @@ def test_tables_for_other_densities(tmp_path):
     assert wider == pytest.approx(1.5 * strain, rel=5e-3)
 
 
+@pytest.mark.slow
 def test_dip_plate_above_the_bottom(tmp_path):
     """Property: the same tank from another zero."""
     high = result_of(tmp_path / "a", settings={"datum.dip_plate_z_m": 0.25})

@@ -60,6 +60,7 @@ def test_folder_and_workbook_give_the_same(tmp_path):
         assert job.strapping.plate_sd_m == {"1": pytest.approx(max(sd, 5e-5))}
 
 
+@pytest.mark.slow
 def test_every_cause_stands_in_the_budget(tmp_path):
     parts = strapped_parts(shell__shape_sd_mm=5.0, strapping__wave_mm=50.0)
     parts.tables["thickness"] = [["course", "thickness_mm"], ["1", 8.9], ["1", 9.1]]
@@ -272,6 +273,7 @@ def test_planted_errors_are_named(tmp_path, code):
     assert code in codes(result_of(straps_with(PLANTED[code]), tmp_path))
 
 
+@pytest.mark.slow
 def test_sound_courses_are_seldom_asked_whether_they_were_exchanged():
     """Simulation, not from the distribution that is assumed: 1.2 mm to either side, even."""
     rng, plates = np.random.default_rng(7), np.array([10.25, 9.25, 8.25, 7.25, 6.55, 6.55]) / 1000
@@ -500,6 +502,7 @@ def test_what_a_master_lacks_is_told_of_the_master(tmp_path):
     assert "T-12.certified_temperature_c" not in places
 
 
+@pytest.mark.slow
 def test_a_shape_that_nobody_declares_is_typical_and_as_uncertain_as_it_is_large(tmp_path):
     job = tankcal.load(write_strapped_job(tmp_path, shell__shape_sd_mm=None))
     wall = find_strapped_wall(job, lambda text: None)

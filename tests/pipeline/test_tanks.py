@@ -88,7 +88,7 @@ def test_a_floating_roof_floats_in_the_liquid_of_each_table(tmp_path):
 # ---- bottom, deadwood, roof
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("form", "centre", "volume"),
     [
@@ -257,7 +257,7 @@ def test_a_correction_that_is_switched_off_is_shown_and_not_made(tmp_path):
 # ---- tilt
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("slope", [0.03, 1 / 70])
 def test_square_sections_times_tilt_factor_give_same_table(tmp_path, slope):
     """Both routes of methods for a leaning shell: cut level, or square to the axis and stretched.
@@ -400,6 +400,7 @@ def test_a_nominal_volume_far_off_is_warned_of(tmp_path):
 # ---- other kinds
 
 
+@pytest.mark.slow
 def test_a_lying_tank_is_its_solid(tmp_path):
     settings = {
         **INSIDE,

@@ -23,7 +23,7 @@ CERTIFICATES = {  # keys of a tape that are in another unit or misread, and what
 }
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("code", CERTIFICATES)
 def test_a_certificate_of_no_tape_is_named(tmp_path, code):
     parts = strapped_parts()
@@ -38,7 +38,7 @@ def test_a_correction_that_class_ii_allows_is_quiet(tmp_path):
     assert "tape_correction_strange" not in told(parts, tmp_path)
 
 
-@pytest.mark.slow(after=2)
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(
     ("given", "is_told"),
     [
@@ -103,6 +103,7 @@ def test_a_shell_of_no_temperature_is_told_where_the_tape_was_warm(tmp_path):
     assert "shell_temperature_of_tapes" not in told(strapped_parts(), tmp_path)
 
 
+@pytest.mark.slow
 def test_the_unit_of_a_pull_is_named(tmp_path):
     """60 N written as 6.1 kgf, and as 13.5 lbf."""
     for pull, unit in ((6.1, "kgf"), (13.5, "lbf")):

@@ -56,7 +56,7 @@ def test_a_wall_without_departures_is_the_round_one(plan):
     np.testing.assert_allclose(still.more_m3([0.5, 3.0]), 0.0, atol=1e-9)
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 def test_girth_and_limbs_are_those_of_the_outline(plan):
     wall = drawn_on(plan)
     for course, level in sorted(levels_of_readings(plan.job))[::7]:
@@ -72,6 +72,7 @@ def test_girth_and_limbs_are_those_of_the_outline(plan):
             assert abs(off) * length < 2e-5
 
 
+@pytest.mark.slow(after=1)
 def test_what_a_drawn_wall_holds(plan):
     """Summation over fine outlines of many heights, over a quarter of a course; a whole one holds
     what the round one does but for squares, for no component has a mean over a course.
@@ -93,6 +94,7 @@ def test_what_a_drawn_wall_holds(plan):
     assert 0 < top_m - foot_m < 1e-2
 
 
+@pytest.mark.slow(after=1)
 def test_readings_come_back_to_the_wall(plan):
     """Without errors: circumferences are girths, hits lie on the wall, offsets are its radii."""
     wall, nominal = drawn_on(plan), plan.job.tank.nominal_diameter_m / 2
@@ -129,6 +131,7 @@ def levels_read_at(job):
     return found.items()
 
 
+@pytest.mark.slow(after=1)
 def test_errors_of_a_cause_are_shared_and_seeded(plan):
     """All readings of a wall are off by the scale of one instrument together; a seed repeats it."""
     errors = Errors(np.random.default_rng(1))

@@ -28,6 +28,7 @@ def warnings_of(plan):
     return lines(plan.warnings)
 
 
+@pytest.mark.slow
 def test_a_pillar_hides_hits_behind_it(tmp_path):
     """Closed form: the angle that it is seen under, from the set-up at (0, 1.5)."""
     plan = planned(tmp_path, HITS, PILLAR.format([0.0, 0.0], 0.5, -1, 20))
@@ -45,6 +46,7 @@ def test_what_is_hidden_widens_u(tmp_path):
     assert predict(plan).table.U_m3[-1] > predict(load_plan(HITS)).table.U_m3[-1]
 
 
+@pytest.mark.slow
 def test_a_stair_hides_upper_levels_of_a_line(tmp_path):
     """Closed form: line 4 stands at x = R + 0.2; from 2 m on nothing is seen along it."""
     plan = planned(tmp_path, LINES, BOX.format([7.0, -0.5, 2.0], [9.0, 0.5, 4.0]))

@@ -41,6 +41,7 @@ def by_cause(table, name):
     return next(one.columns_m3 for one in table.sources if one.kind == name)
 
 
+@pytest.mark.slow
 def test_what_is_read_of_a_bar(tmp_path):
     """Closed form: sides of the triangle of set-ups, d = (b/2) cot(beta/2), its sd."""
     plan = planned(tmp_path)
@@ -96,6 +97,7 @@ def test_reliability_is_of_single_readings(prediction, tmp_path, monkeypatch):
     assert group.blunder == pytest.approx(max(one.mdb for one in mine), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_length_of_the_bar_scales_the_tank(tmp_path):
     """Closed form: a bar that is off by u / b scales areas by twice that, at any dip."""
     found = predict(planned(tmp_path))
@@ -103,6 +105,7 @@ def test_length_of_the_bar_scales_the_tank(tmp_path):
     assert share / found.table.volume_m3[-1] == pytest.approx(2 * 0.03e-3 / BAR_M, rel=0.01)
 
 
+@pytest.mark.slow
 def test_without_a_bar_nothing_tells_the_scale(tmp_path):
     """The same plan, its stadia.csv left out; with a tape in its place the tape does."""
     with pytest.raises(SolutionError, match="the scale is not determined by any observation"):
@@ -130,6 +133,7 @@ def test_what_would_tell_the_scale(tmp_path, capsys):
     assert "Traceback" not in said.err
 
 
+@pytest.mark.slow
 def test_base_from_one_end_is_named(tmp_path):
     """The exchange rule, by row, in the words of the job."""
     found = predict(planned(tmp_path, "T1-1,T1-2,1,2\nT1-2,T1-1,1,\nT1-2,T1-3,1,\n"))

@@ -208,6 +208,7 @@ def volume_of(plan, measurements):
     ).table.volume_m3[-1]
 
 
+@pytest.mark.slow
 def test_a_bad_point_is_weak_and_a_hidden_one_is_not_determined(plan):
     """Property: fewer stations leave points with two rays, one, none; each is told by name."""
     few = replace(plan, photos=plan.photos[:7])

@@ -76,6 +76,7 @@ def shape(predicted):
     return np.sqrt(np.diag(slopes @ adjusted.covariance_m2(points) @ slopes.T))
 
 
+@pytest.mark.slow
 def test_three_distances_suffice_two_in_a_plane_do_not(shape_sds, figure):
     """Published: tests 5 (eight), 6 (three axes), 9 and 10 (two in a plane; residuals at check
     points are 1.3 times as large). Here: three are within a factor of 1.7 of eight in all of the
@@ -135,6 +136,7 @@ def test_the_fixed_station_does_not_matter_for_the_shape(network):
     assert found[2] == pytest.approx(found[0], rel=1e-5)
 
 
+@pytest.mark.slow
 def test_at_least_three_rays_a_point(figure):
     """Published: three rays or more. Ours: a blunder in an image point of two rays is hardly found,
     for along the plane through both stations nothing controls it."""

@@ -262,6 +262,7 @@ def test_a_plan_without_a_datum(changed):
         predict(load_plan(folder))
 
 
+@pytest.mark.slow
 def test_a_plan_without_a_vertical_or_scale(changed):
     folder = changed(('datum = "control"', 'datum = "inner"'), ("[0]", "[0, 90]"))
     (folder / "control.csv").write_text(control_without_sds())

@@ -533,6 +533,7 @@ def test_control_targets_are_read_at_the_start_again_and_at_the_end(tmp_path, mo
     assert {one["time"] for one in empty} == {one["distance_m"] for one in empty} == {""}
 
 
+@pytest.mark.slow
 def test_three_hits_at_two_heights_are_enough(tmp_path):
     """The least that is accepted does give a prediction."""
     folder = plan_of(tmp_path / "plan", HITS, ("hits = 20 ", "hits = 3 "))

@@ -323,6 +323,7 @@ def test_coverage_of_a_sticking_gauge(levels, repeats, tmp_path, figure):
     assert share.max() <= 0.985
 
 
+@pytest.mark.slow
 def test_simulated_gauge_through_the_files(tmp_path):
     """Readings of the simulation as files: the corrections give the level within U."""
     rng, outside = np.random.default_rng(3), 0
@@ -387,6 +388,7 @@ def record_folder(made_once):
     )
 
 
+@pytest.mark.slow
 def test_movement_of_a_gauge_on_the_shell(tmp_path, record_folder):
     """Readings with the movement of the record as their only error: nothing is left in the line."""
     record = str(record_folder / "r")
@@ -602,6 +604,7 @@ def test_starter_is_complete_once_filled_in(tmp_path, language):
     assert computed(place)["tank"] == "TK-1"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_certificate_and_files(folder, tmp_path, language, capsys):
     write(folder, limit={"absolute_mm": 4, "source": "contract 12", "rule": "guarded"},
@@ -626,6 +629,7 @@ def test_certificate_and_files(folder, tmp_path, language, capsys):
         assert text.count("\f") == 2
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_workbook_has_the_main_result_and_the_remarks(tmp_path, language):
     out = tmp_path / "out"
@@ -660,6 +664,7 @@ def test_long_notes_keep_the_end_mark_with_the_signatures(tmp_path):
     assert counts == {2, 3}
 
 
+@pytest.mark.slow
 def test_papers_are_written_again_in_another_language(folder, tmp_path):
     out, again = tmp_path / "out", tmp_path / "again"
     assert main(["gauge", str(folder), "--out", str(out), "--quiet"]) == 0
@@ -669,6 +674,7 @@ def test_papers_are_written_again_in_another_language(folder, tmp_path):
     assert main(["report", str(out), "--out", str(again)]) == 2
 
 
+@pytest.mark.slow
 def test_json_and_equal_bytes(folder, tmp_path, capsys):
     assert main(["gauge", str(folder), "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
@@ -680,6 +686,7 @@ def test_json_and_equal_bytes(folder, tmp_path, capsys):
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
 
 
+@pytest.mark.slow
 def test_hostile_texts_are_only_texts(tmp_path):
     hostile = {"number": "=1+1", "by": "#let x = 1", "place": "<b>" + "x" * 200, "note": "*a_"}
     folder = write(tmp_path / "g", certificate=hostile)
@@ -722,7 +729,7 @@ CHANGES = {
 }
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("what", CHANGES)
 def test_a_changed_value_is_detected_although_all_hashes_agree(tmp_path, what):
     out = tmp_path / "out"
@@ -733,6 +740,7 @@ def test_a_changed_value_is_detected_although_all_hashes_agree(tmp_path, what):
         assert {problem.expected.code for problem in result.problems} == {"verify_value_apart"}
 
 
+@pytest.mark.slow
 def test_readings_changed_with_all_their_results_are_detected_by_the_input_files(tmp_path):
     """A forged comparison agrees with itself; only readings.csv contradicts it."""
     out, forged = tmp_path / "out", tmp_path / "forged"
@@ -792,6 +800,7 @@ def test_example_gives_the_truth(tmp_path):
     assert gauge["decision"]["verdict"] == "passed"
 
 
+@pytest.mark.slow
 def test_example_is_written_again_by_its_simulation(tmp_path):
     shutil.copytree(GAUGE_EXAMPLE, tmp_path / "g")
     for name in ("readings.csv", "truth.json"):

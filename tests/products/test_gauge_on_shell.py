@@ -42,6 +42,7 @@ def settings(record, **more):
     return {"gauge": gauge, "liquid": {"density_kg_m3": DENSITY}, **more}
 
 
+@pytest.mark.slow
 def test_corrections_of_a_perfect_gauge_are_the_movement_of_the_top(tmp_path, record_folder):
     levels = np.array([1.0, 2.5, 4.0, 6.0, 7.5, 9.0])
     rows = [(n, level, level + drop_of_the_top(level)) for n, level in enumerate(levels)]

@@ -81,6 +81,7 @@ def test_a_command_loads_no_module_of_another_command(command):
     assert done.stdout.splitlines()[-1] == f"loaded {expected[command]}"
 
 
+@pytest.mark.slow
 def test_help_and_dispatch_of_a_product_of_another_distribution():
     done = call("barrels", "1.58987294928")
     assert (done.returncode, done.stdout, done.stderr) == (0, "10.0000 bbl\n", "")
@@ -90,6 +91,7 @@ def test_help_and_dispatch_of_a_product_of_another_distribution():
     assert "barrels" not in call("--help", folder=TOY.parent).stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("language", "line", "volume"),
     [
@@ -105,7 +107,7 @@ def test_help_of_another_distribution_in_the_language(language, line, volume):
     assert "bbl or gal" in done.stdout  # without a translation the English text remains
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_completion_of_another_distribution(shell):
     pytest.importorskip("shtab")
@@ -115,6 +117,7 @@ def test_completion_of_another_distribution(shell):
     assert "bbl gal" in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("entry", "reason"),
     [

@@ -64,6 +64,7 @@ def test_volumes_are_those_of_the_closed_form(settings, air_c):
             np.testing.assert_allclose(standard.U_m3[i, j], 1.959964 * u, rtol=2e-6)
 
 
+@pytest.mark.slow
 def test_each_cell_is_the_ticket_of_its_readings(settings, example_record, tmp_path):
     table = read_table(example_record)
     standard = compute_standard_table(table, settings, TEMPERATURES, DENSITIES, 70, 9.0)
@@ -83,6 +84,7 @@ def test_each_cell_is_the_ticket_of_its_readings(settings, example_record, tmp_p
         assert standard.k[i, j, row] == pytest.approx(result.k[0, 2], rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_roof_has_no_volumes_below_the_level_at_which_it_floats(settings, tmp_path):
     afloat(tmp_path)
     table = read_table(tmp_path / "record.json")
@@ -104,6 +106,7 @@ def test_dips_are_whole_steps_within_the_table():
     assert list_dips(table, 7).tolist() == [7 * step / 100 for step in range(2, 18)]
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("suffix", ["csv", "xlsx", "pdf"])
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_the_files_contain_the_volumes(
@@ -139,6 +142,7 @@ def test_the_files_contain_the_volumes(
         assert f"{standard.vcf[1, 1]:.5f}"[2:] in text
 
 
+@pytest.mark.slow
 def test_problems_name_the_option_or_the_file(settings, example_record, tmp_path, capsys):
     table = read_table(example_record)
 

@@ -243,6 +243,7 @@ def simulate_transfers(count, seed, *, is_density_shared=True):
     return np.mean(np.abs(result.value[:, NSV] - true_moved) <= result.U[:, NSV])
 
 
+@pytest.mark.slow
 def test_intervals_of_transfers_hold():
     """A small part of the study: 300 transfers, of which fewer than 0.90 or more than 0.99 are
     held by chance in less than one of 1000 runs.
@@ -416,6 +417,7 @@ def test_each_density_outside_the_range_is_named_with_its_value(settings, tmp_pa
     assert "found 560" in second
 
 
+@pytest.mark.slow
 def test_glass_of_the_brazilian_table_is_corrected_once(settings):
     """The table is entered with the reading; a vibrating tube gives the corrected reading."""
     reading, celsius = 835.2, 27.5
@@ -431,6 +433,7 @@ def test_glass_of_the_brazilian_table_is_corrected_once(settings):
     assert by_glass == pytest.approx(840.1905, abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "text"),
     [
@@ -458,6 +461,7 @@ def test_water_at_the_roof_is_refused(settings):
         read_tickets(_cylinder(with_roof=True), path)
 
 
+@pytest.mark.slow
 def test_roof_of_a_record_corrects_the_volume(tmp_path, example_record):
     """The displacement by Archimedes, in a table with the roof and in a table without it."""
     record = json.loads(example_record.read_text(encoding="utf-8"))
@@ -492,6 +496,7 @@ def test_comparison_of_a_row_may_be_missing(settings, tmp_path):
         assert json.dumps([first, second], allow_nan=False)
 
 
+@pytest.mark.slow
 def test_columns_of_an_opening_make_a_transfer(settings, tmp_path):
     """An opening without its temperature was left out."""
     begin, end = SETTINGS.index("[opening]"), SETTINGS.index("[closing]")
@@ -511,6 +516,7 @@ def test_tickets_have_different_names(settings, tmp_path):
         read_tickets(_cylinder(), settings(), rows)
 
 
+@pytest.mark.slow
 def test_decimal_mark_can_be_declared(settings, tmp_path):
     rows = tmp_path / "tickets.csv"
     rows.write_text("ticket;density_kg_m3\nA;1,025\n", encoding="utf-8")
@@ -598,6 +604,7 @@ def test_an_unknown_column_is_reported_alone(settings, tmp_path):
     assert [problem.column for problem in refused.value.problems] == ["closing_gauge"]
 
 
+@pytest.mark.slow
 def test_command_prints_the_quantities(settings, example_record, tmp_path, capsys):
     path = settings(("dip_m = 9.0", "dip_m = 8.5"))
     out = tmp_path / "out.csv"
@@ -615,6 +622,7 @@ def test_command_prints_the_quantities(settings, example_record, tmp_path, capsy
     assert ticket["moved_U_nsv_m3"] == pytest.approx(direct.U[0, NSV], rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", ["pt-BR", "es"])
 def test_command_speaks_the_language(settings, example_record, language, capsys):
     path = settings(("dip_m = 9.0", "dip_m = 8.5"))
@@ -751,6 +759,7 @@ def test_rooms_of_a_tank_with_a_floating_roof(settings):
     assert density[0] < 1e-12 < density[1]
 
 
+@pytest.mark.slow
 def test_rooms_are_columns_only_with_levels(settings):
     without, with_levels = _cylinder(), replace(_cylinder(), levels=LEVELS | {"minimum_m": None})
     assert "closing_room_m3" not in rows_of(read_tickets(without, settings()))[0]

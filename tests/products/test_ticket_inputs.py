@@ -200,6 +200,7 @@ def test_the_empty_form_asks_for_what_is_missing(tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_an_existing_form_is_left_alone(example_record, tmp_path, capsys):
     path = tmp_path / "t.toml"
     command = ["ticket", str(example_record), str(path), "--new", "--language", "es"]
@@ -223,6 +224,7 @@ def _compared(inputs, U=2.0):
     return inputs | {"compared": {"quantity": "nsv_m3", "value": value, "U": U}}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("slip", "key"),
     [
@@ -245,6 +247,7 @@ def test_a_slip_that_explains_a_contradiction_is_named(slip, key):
     assert key in slips
 
 
+@pytest.mark.slow
 def test_another_base_of_the_volume_is_named_alone():
     """Exchanged dips would give the same volume in the other direction, which explains nothing."""
     inputs = _compared(_inputs())
@@ -253,6 +256,7 @@ def test_another_base_of_the_volume_is_named_alone():
     assert slips == ["product.base"]
 
 
+@pytest.mark.slow
 def test_a_difference_that_no_slip_explains_is_left(tmp_path):
     inputs = _compared(_inputs())
     inputs["compared"]["value"] += 50.0
@@ -286,6 +290,7 @@ def test_hot_air_is_told():
 # ---- Python
 
 
+@pytest.mark.slow
 def test_result_and_record_give_the_same_ticket(example_result, example_record):
     inputs = _inputs(closing={"dip_m": 8.5})
     by_result = example_result.ticket(inputs)
@@ -300,6 +305,7 @@ def test_result_and_record_give_the_same_ticket(example_result, example_record):
         tankcal.ticket(example_record, inputs).transfer.table.digest)  # fmt: skip
 
 
+@pytest.mark.slow
 def test_frame_and_budgets_of_python(example_result):
     ticket = example_result.ticket(_inputs(closing={"dip_m": 8.5}))
     frame = ticket.frame()

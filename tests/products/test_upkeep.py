@@ -240,6 +240,7 @@ def find_fault(table, kind, seed, days, begin):
     return suspect
 
 
+@pytest.mark.slow
 def test_planted_leak_is_named(table):
     """A leak of day 38.3: its beginning within two days, its rate within 3 u."""
     suspect = find_fault(table, "leak", 1, 60, 38.3)

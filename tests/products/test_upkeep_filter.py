@@ -75,6 +75,7 @@ def case():
     return drift, data
 
 
+@pytest.mark.slow
 def test_filter_equals_least_squares(case):
     """Whitened rows, estimates, covariance, chi-square and innovations, 500 steps."""
     drift, data = case
@@ -98,6 +99,7 @@ def test_filter_equals_least_squares(case):
         assert_allclose(innovations, scipy.linalg.solve_triangular(total, y, lower=True), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_filter_equals_adjusted_steps(case):
     """The adjustment of metered runs, with the same columns."""
     drift, data = case

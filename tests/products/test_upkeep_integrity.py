@@ -221,6 +221,7 @@ def test_a_removed_transaction_shows_in_the_totals(tmp_path):
     assert counts(less)["total_unlike_sum"] == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("declared", [False, True])
 def test_a_changed_table_of_the_gauge_is_found(tmp_path, declared):
     """From day 20 on, the gauge states 1 % more at equal levels; noise alone is no change."""

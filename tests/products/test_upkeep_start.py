@@ -196,6 +196,7 @@ def test_drawing_as_a_job(station, tmp_path, capsys):
     assert saved["rows"] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", ["en", "es", "pt-BR"])
 def test_bad_start_is_one_line(tmp_path, capsys, language):
     folder = tmp_path / "station"

@@ -70,6 +70,7 @@ def unpacked(path, folder):
     return to
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(
     "kind", ["furnished", "uncertain", pytest.param("lying", marks=pytest.mark.slow)]
 )
@@ -186,7 +187,7 @@ def test_tables_of_the_same_name_are_told_apart_by_their_folders(tmp_path):
     assert "but old/results/table.csv is of a vertical one" in said
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("end", ["\r\n", "\r"])
 def test_former_with_the_line_ends_of_any_system(tmp_path, end):
     asked = write_tables(tmp_path)

@@ -295,6 +295,7 @@ def test_columns_that_differ_are_asked_for(tmp_path):
     assert former.volume_m3[-1] == pytest.approx(1.01 * VOLUME[-1], abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_record_is_not_contradicted(example_record, tmp_path):
     toml = tmp_path / "former.toml"
     toml.write_text("[former]\nreference_temperature_c = 15.5\nU_m3 = 1\nk = 2\n")

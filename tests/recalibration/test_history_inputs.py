@@ -70,6 +70,7 @@ def test_the_certificates_of_one_tank_of_an_archive(archive):
     assert radius[2, 3] / radius[1, 3] - 1 == pytest.approx(5e-5, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_an_archive_of_several_tanks_asks_which(archive):
     assert refused([archive]) == ["history_several_tanks"]
 

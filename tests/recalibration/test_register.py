@@ -37,6 +37,7 @@ def register(tmp_path):
     return tmp_path / "certificates.csv"
 
 
+@pytest.mark.slow
 def test_a_number_is_given_once(tmp_path, record, register):
     first = write_results(tmp_path, record, "7/2024")
     [entry] = issue(register, [first])
@@ -47,6 +48,7 @@ def test_a_number_is_given_once(tmp_path, record, register):
     assert register.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_a_new_certificate_replaces_the_one_that_it_names(tmp_path, record, register):
     issue(register, [write_results(tmp_path, record, "7/2024")])
     later = write_results(
@@ -60,6 +62,7 @@ def test_a_new_certificate_replaces_the_one_that_it_names(tmp_path, record, regi
     assert states["9/2024"].state == "issued"
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(
     ("certificate", "expected"),
     [

@@ -62,6 +62,7 @@ def read(tank, table, **more):
     return read_upright(table, tank.heights_m, tank.thickness_m, **more)
 
 
+@pytest.mark.slow
 def test_published_example_with_head():
     """Published: recalibration.md, section 3, each printed digit."""
     former = table_of_s1(850)
@@ -184,6 +185,7 @@ def test_seams_elsewhere_than_declared_are_found():
     assert_allclose([one.value for one in found.seams_m], [1.9, 3.9], atol=5e-3)
 
 
+@pytest.mark.slow
 def test_undeclared_seams():
     tank = steps(density_kg_m3=800.0)
     former = table_of(tank)
@@ -230,6 +232,7 @@ def test_kinks_in_other_pairs():
     assert_allclose([f.volume_m3 for f in again], [-0.5, -0.2])
 
 
+@pytest.mark.slow
 def test_a_thing_whose_u_is_beyond_it_is_none():
     """Simulated without things: one that was put beside free seams has a u of any size."""
     former = table_of(SimulatedTank(6.5 - PLATES, HEIGHTS, PLATES, density_kg_m3=850.0))

@@ -41,6 +41,7 @@ def smooth(rows, inputs, joints, rng):
     return np.hstack([above, above**2]) @ rng.normal(size=(2 * len(edges), inputs))
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=40)
 @given(
     st.integers(1, 3 * ROWS),

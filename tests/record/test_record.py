@@ -27,6 +27,7 @@ def test_it_is_strict_json_and_comes_back(example_result, tmp_path):
     assert "NaN" not in (tmp_path / "record.json").read_text()
 
 
+@pytest.mark.slow
 def test_it_is_read_as_dataclasses(example_record, example_result):
     read = records.read(example_record)
     assert read.capacity.volume_m3 == list(example_result.table.volume_m3)

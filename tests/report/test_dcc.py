@@ -58,7 +58,7 @@ def test_certificates_of_every_kind_have_the_structure_of_the_schema(structure, 
     assert problems(structure, certificate_of(records[kind])) == []
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_structure_of_the_example_in_every_language(structure, example, language):
     xml = certificate_of(example, language)
@@ -112,6 +112,7 @@ def test_rows_are_those_of_the_record(example):
     ]
 
 
+@pytest.mark.slow
 def test_expanded_uncertainty_and_k_where_every_row_has_them(structure, example):
     record = copy.deepcopy(example)
     record["capacity"]["interval"] = ["gum"] * len(record["capacity"]["k"])
@@ -124,6 +125,7 @@ def test_expanded_uncertainty_and_k_where_every_row_has_them(structure, example)
     assert problems(structure, xml) == []
 
 
+@pytest.mark.slow
 def test_no_uncertainty_is_stated_where_none_was_declared(structure, example):
     record = copy.deepcopy(example)
     rows = len(record["capacity"]["k"])
@@ -133,6 +135,7 @@ def test_no_uncertainty_is_stated_where_none_was_declared(structure, example):
     assert problems(structure, xml) == []
 
 
+@pytest.mark.slow
 def test_a_coverage_factor_below_1_is_stated_as_an_interval(structure, example):
     record = copy.deepcopy(example)
     rows = len(record["capacity"]["k"])
@@ -142,6 +145,7 @@ def test_a_coverage_factor_below_1_is_stated_as_an_interval(structure, example):
     assert problems(structure, xml) == []
 
 
+@pytest.mark.slow
 def test_what_the_job_does_not_give_is_said_to_be_not_stated(structure, example):
     record = copy.deepcopy(example)
     record["job"]["certificate"] = {}
@@ -174,7 +178,7 @@ def test_what_the_job_gives_is_there(example):
     assert "notStated" not in xml
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("where", ["certificate", "details", "names"])
 def test_no_text_of_a_user_breaks_it(structure, example, where):
     record = copy.deepcopy(example)
@@ -260,6 +264,7 @@ def test_digest_of_the_file_is_that_of_the_record(example_record, example):
     assert f"sha256:{digest}" in dcc.certificate_xml(example, digest).decode()
 
 
+@pytest.mark.slow
 def test_operating_levels_have_the_volumes_of_the_record(structure, example):
     """A level and a volume between two levels; without a valid k, U is a separate quantity."""
     record = copy.deepcopy(example)

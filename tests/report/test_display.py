@@ -68,6 +68,7 @@ def test_every_drawing_of_a_result_is_a_figure(example_result, what):
     assert isinstance(example_result.plot(what), Figure)
 
 
+@pytest.mark.slow
 def test_the_drawn_residuals_are_those_of_the_record(example_result, example_record):
     """Second source: the record computes azimuths from the points themselves."""
     sections = json.loads(Path(example_record).read_text(encoding="utf-8"))["sections"]

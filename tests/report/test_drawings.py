@@ -31,7 +31,7 @@ def written(count, radius=1.0, text="1-{0:02d}, 2-{0:02d}, 3-{0:02d}, 4-{0:02d},
         return boxes, ax.transData.transform(xy), left_out, ax.get_window_extent()
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [12, 24, 60])
 def test_no_name_covers_another_or_a_mark(count):
     boxes, marks, left_out, frame = written(count)

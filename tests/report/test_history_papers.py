@@ -143,7 +143,7 @@ def test_what_is_no_history_is_refused(tmp_path, text, said):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [{"certificates": []}, {"tank": 7}])
 def test_a_damaged_history_is_told_in_one_line(tmp_path, change):
     path = tmp_path / "history.json"

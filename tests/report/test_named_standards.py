@@ -54,6 +54,7 @@ def test_the_expression_finds_the_standards_of_tank_calibration():
     }
 
 
+@pytest.mark.slow
 def test_a_declared_standard_is_the_norm_of_the_method():
     record = record_of_example("strapping")
     certificate = record["job"]["certificate"] | {"standard": "ISO 7507-1:2003"}

@@ -149,6 +149,7 @@ OUTSIDE = {  # values that the reader of tickets refuses
 }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_page_refuses_a_reading_outside_the_limits_of_a_ticket(tmp_path):
     record = example_with_rows(0.2, tmp_path)[1]
     table = read_table(tmp_path / "record.json")

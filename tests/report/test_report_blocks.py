@@ -93,6 +93,7 @@ def test_control_characters_become_spaces():
     assert blocks.paragraph("a\x00b\x1b\u202ec\ud800d").data["text"] == "a b  c d"
 
 
+@pytest.mark.slow
 def test_the_same_figure_gives_the_same_bytes():
     def drawn():
         figure = Figure(figsize=(2, 1))

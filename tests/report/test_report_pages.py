@@ -56,7 +56,7 @@ def test_a_long_table_has_no_lone_rows(printed, above):
     assert min(found) >= TOGETHER
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 def test_each_page_of_a_captioned_table_has_its_caption(printed):
     table = blocks.table(["a"], [[f"row {n}"] for n in range(150)], "a list of 2 degrees")
     pages = printed(blocks.repeat_caption(table))
@@ -87,7 +87,7 @@ AFTER_A_HEADING = {
 }
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("what", AFTER_A_HEADING)
 def test_no_heading_ends_a_page(tmp_path, what):
     """Each document of one PDF has one line more above the heading than the one before."""
@@ -103,7 +103,7 @@ def test_no_heading_ends_a_page(tmp_path, what):
     assert lone_headings(pages, {"Alone"}) == []
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("above", "count"), [(31, 200), (38, 905)])
 def test_a_heading_goes_with_its_long_table(tmp_path, above, count):
     table = blocks.columns_table(["a"], numbered(count), "c", across=4)
@@ -177,6 +177,7 @@ def test_a_first_page_without_facts_has_its_figure(printed):
     assert "the sketch" in page
 
 
+@pytest.mark.slow
 def test_facts_keep_distance_from_text_above(tmp_path):
     """A list too long for one block stands no closer below a paragraph than a short one."""
     found = []

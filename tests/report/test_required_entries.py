@@ -101,6 +101,7 @@ def test_only_the_certificate_is_an_original(tmp_path, capsys):
     assert "is a copy" in (out / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_the_workbook_marks_the_required_entries(tmp_path):
     path = write_input_workbook(tmp_path / "tank.xlsx", "vertical", None, "en")
     sheet = openpyxl.load_workbook(path)["job"]

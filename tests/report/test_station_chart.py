@@ -34,6 +34,7 @@ def test_volumes_are_those_of_the_table_between_its_rows(tank):
     assert dict(rows)[25] == pytest.approx(low + 0.25 * (high - low), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_critical_zone_has_no_volumes(tmp_path):
     record = afloat(tmp_path)[1]
     rows = dict(chart_rows(record))
@@ -44,6 +45,7 @@ def test_a_critical_zone_has_no_volumes(tmp_path):
     assert blank
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_the_most_rows_are_readable_on_a_page(tank, language):
     record, _ = tank
@@ -62,6 +64,7 @@ def test_every_number_of_rows_is_a_page(tank, count):
     assert len(pypdf.PdfReader(io.BytesIO(content)).pages) == 1
 
 
+@pytest.mark.slow
 def test_the_command_writes_each_row_and_the_facts(tank, tmp_path, capsys):
     record, source = tank
     out = tmp_path / "chart.pdf"
@@ -86,6 +89,7 @@ def test_too_many_rows_and_a_wrong_ending_are_refused(tank, tmp_path, capsys):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_ullages_are_the_reference_height_less_the_dip(tmp_path, capsys):
     record = afloat(tmp_path)[1]
     capacity, reference = record["capacity"], record["job"]["datum"]["reference_height_m"]
@@ -112,6 +116,7 @@ def test_ullages_need_a_reference_height(tank, tmp_path, capsys):
     assert "reference height" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_a_critical_zone_is_hatched_and_explained(tmp_path, language):
     record = afloat(tmp_path)[1]
@@ -141,11 +146,13 @@ def test_a_water_table_has_the_volumes_of_the_table_at_each_millimetre(tank):
     assert [mm for mm, _ in water_rows(record, 5)][:3] == [0, 5, 10]
 
 
+@pytest.mark.slow
 def test_a_water_table_ends_below_the_roof(tmp_path):
     record = afloat(tmp_path)[1]
     assert water_rows(record, 5)[-1][0] == 1000  # the critical zone begins at 1 m
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_water_table_with_the_U_of_its_rows(tank, tmp_path, capsys):
     record, source = tank
     out = tmp_path / "water.pdf"

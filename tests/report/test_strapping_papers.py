@@ -119,7 +119,7 @@ def test_what_was_assumed_is_said(strapped):
     assert "tilt" in missing  # not measured, and no standard uncertainty was declared
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 def test_a_declared_tilt_is_not_missing(tmp_path):
     parts = strapped_parts()
     parts.tables["uncertainty"] = [["input", "u", "unit", "type"], ["tilt", 2.0, "mm/m", "B"]]

@@ -111,6 +111,7 @@ def _copy(tank, tmp_path):
     return shutil.copytree(tank, tmp_path / "tank")
 
 
+@pytest.mark.slow
 def test_saved_values_are_those_of_the_computation(tank):
     saved = json.loads((tank / "out" / "ticket.json").read_text(encoding="utf-8"))
     table = read_table(tank / "results" / "record.json")
@@ -178,6 +179,7 @@ def test_degrees_of_freedom_of_the_table_reach_the_quantities():
         assert row["k"] == pytest.approx(2.306, abs=1e-3)  # Student's t, 97.5 %
 
 
+@pytest.mark.slow
 def test_xml_has_the_structure_of_the_digital_certificate(tank):
     data = (tank / "out" / "ticket.xml").read_bytes()
     schema().validate(data.decode("utf-8"))
@@ -197,6 +199,7 @@ def test_workbook_has_numbers(tank):
         assert np.min(np.abs(numbers / row["value"] - 1)) < 1e-14
 
 
+@pytest.mark.slow
 def test_verification_computes_the_ticket_again(tank):
     result = verify(tank / "out")
     assert (result.problems, result.papers_again) == ([], True)
@@ -231,7 +234,7 @@ def _declare(saved):
         row["origin"] = "declared"
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [_enlarge, _shrink_u, _move_dip, _declare])
 def test_a_changed_ticket_is_detected_although_all_files_agree(tank, tmp_path, change):
     folder = _copy(tank, tmp_path)
@@ -240,6 +243,7 @@ def test_a_changed_ticket_is_detected_although_all_files_agree(tank, tmp_path, c
     assert {problem.expected.code for problem in result.problems} == {"verify_value_apart"}
 
 
+@pytest.mark.slow
 def test_changed_files_are_detected(tank, tmp_path):
     folder = _copy(tank, tmp_path)
     path = folder / "out" / "steps.csv"
@@ -250,6 +254,7 @@ def test_changed_files_are_detected(tank, tmp_path):
     assert codes == {"verify_other_paper", "verify_input_changed"}
 
 
+@pytest.mark.slow
 def test_without_the_record_nothing_is_claimed(tank, tmp_path):
     folder = _copy(tank, tmp_path)
     (folder / "results" / "record.json").unlink()
@@ -259,6 +264,7 @@ def test_without_the_record_nothing_is_claimed(tank, tmp_path):
     assert result.by_hash == ["ticket.json"]
 
 
+@pytest.mark.slow
 def test_documents_are_made_again_in_another_language(tank, tmp_path, capsys):
     folder = _copy(tank, tmp_path) / "out"
     assert main(["report", str(folder), "--language", "es", "--quiet"]) == 0
@@ -319,6 +325,7 @@ def test_each_ticket_of_a_file_has_its_document(tank, tmp_path, capsys):
     capsys.readouterr()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("content", [b"", b"%PDF-1.7 mine", b"letter"])
 def test_a_pdf_of_the_user_is_not_replaced_by_the_pages(tank, tmp_path, capsys, content):
     folder, rows = tmp_path / "out", tmp_path / "rows.csv"
@@ -332,6 +339,7 @@ def test_a_pdf_of_the_user_is_not_replaced_by_the_pages(tank, tmp_path, capsys, 
     assert (folder / BOOKLET).read_bytes() == content
 
 
+@pytest.mark.slow
 def test_folders_of_tickets_are_checked_before_the_first_document(tank, tmp_path, capsys):
     folder, rows = tmp_path / "out", tmp_path / "rows.csv"
     ticket = ["ticket", str(tank / "results"), str(tank / "ticket.toml"), "--tickets", str(rows)]

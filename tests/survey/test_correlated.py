@@ -209,7 +209,7 @@ def test_single_vector_of_a_block_is_tested_when_set_aside(network):
     np.testing.assert_allclose(table.residual[0], -biases, rtol=1e-5)
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("single", [False, True], ids=["all correlated", "levels are not"])
 @pytest.mark.parametrize(("wrong", "size"), [((0, 4), 0.04), ((1, 2), 0.08), ((2, 1), 0.02)])
 def test_readings_that_may_be_wrong_instead(network, single, wrong, size):

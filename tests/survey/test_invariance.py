@@ -48,7 +48,7 @@ def told(figure, what, differences):
     return differences
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 def test_coordinates_as_large_as_utm(surveyed, figure):
     measurements, before = surveyed
     far = with_control(measurements, lambda xyz: xyz + UTM)
@@ -63,7 +63,7 @@ def test_coordinates_as_large_as_utm(surveyed, figure):
     assert covariance < 1e-6
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [37.0, 180.0])
 def test_a_frame_turned_about_the_vertical(surveyed, degrees, figure):
     measurements, before = surveyed

@@ -345,6 +345,7 @@ def test_values_that_are_not_angles(text):
         read_value(DMS, text, ".")
 
 
+@pytest.mark.slow
 @given(st.floats(-359.9, 359.9))
 def test_an_angle_survives_being_written(degrees):
     # property: written to 1e-6 seconds and read again, to half of that

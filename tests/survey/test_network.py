@@ -104,6 +104,7 @@ def not_compiled(module, names):
     return SimpleNamespace(**{name: vars(module)[name] for name in names})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "compiler", [not_compiled, pytest.param(compile_functions, marks=pytest.mark.slow)]
 )
@@ -256,7 +257,7 @@ def circle(xyz):
     return radius(flat), np.array([(radius(flat + s) - radius(flat - s)) / 2e-4 for s in step])
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("tapes_used", [8, 1])
 def test_the_shape_does_not_depend_on_the_fixed_photo(survey, tapes_used, figure):
     """Property: distances, radii and their sds are the same whichever photo is held; not places.
@@ -482,6 +483,7 @@ def test_components_tell_which_group_is_worse_than_declared():
     assert found["image points"].factor == pytest.approx(1, abs=0.2)
 
 
+@pytest.mark.slow
 def test_balanced_weights_find_the_true_sds(figure):
     """Property: the control was made with 2 mm; declared with 0.4 mm it comes out near 2 mm."""
     survey, _ = photographed(seed=4)

@@ -56,7 +56,7 @@ def biased(survey, source, row, value, by):
     return replace(survey, observations=tuple(observations))
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("datum", CASES)
 def test_effect_of_an_undetected_blunder(datum, figure):
     """Second method: a hundredth of the bias put in, adjusted again."""
@@ -131,6 +131,7 @@ def test_effect_of_an_unknown_known_beforehand(datum, figure):
     assert not found.effect_of_known_m("scale", 5).any()
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("datum", CASES)
 def test_thousands_of_check_observations(datum):
     """Second method: the cofactors of each row by themselves."""
@@ -197,6 +198,7 @@ def test_scale_of_the_covariances():
         adjust(bare).scale("a_posteriori")
 
 
+@pytest.mark.slow
 def test_which_quantities_depend_on_the_datum():
     """Closed form: photos and tapes give the shape, not its place nor its attitude."""
     free = adjust(replace(SURVEY, observations=SURVEY.observations[1:]), datum="inner")

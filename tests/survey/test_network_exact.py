@@ -86,7 +86,7 @@ def with_sd(one, sd):
     return replace(one, sd=np.full(np.shape(one.sd), sd))
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("what", KINDS)
 def test_exact_is_the_limit_of_small_sds(survey, what, figure):
     """Second method: sds of 1e-4 to 1e-6 (m, rad), extrapolated; points, covariance, tests."""
@@ -332,7 +332,7 @@ def test_a_further_system_held_exactly(survey):
     assert values[np.arange(9), axis] == pytest.approx(known.value, abs=1e-11)
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("kept", [[], [1], [0, 1]])
 def test_photos_held_by_their_elements_or_as_a_whole(survey, kept):
     """Second method: all six elements of all photos exact, or not unknown at all; camera known."""

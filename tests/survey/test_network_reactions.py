@@ -63,7 +63,7 @@ def test_a_line_of_levels_between_held_heights():
     assert np.isinf(table.mdb[[place[row] for row in (0, 1, 3, 4, 6, 7)]]).all()
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("tied", [False, True])
 def test_reaction_equals_release(held, tied):
     """Second method: each coordinate released in turn, and everything adjusted again."""

@@ -159,6 +159,7 @@ def _known(kinds, number):
     return float(kinds[-2].value[number]), float(kinds[-1].value[number])
 
 
+@pytest.mark.slow
 def test_every_kind_by_a_second_method(figure):
     """Second method: coordinates, covariance and v'Pv; all kinds in one adjustment."""
     survey, kinds, more = everything()

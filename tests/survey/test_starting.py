@@ -40,7 +40,7 @@ def test_three_points_give_the_true_pose_among_at_most_four():
         assert rotations[away.argmin()] == pytest.approx(truth.rotation[photo], abs=1e-5)
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("blunders", [0, 0.1])
 def test_nominal_geometry_alone_leads_to_the_same_answer(blunders):
     """Property: same adjusted points as from good start values, with 10 % of wild image points."""

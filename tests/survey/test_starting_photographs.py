@@ -102,7 +102,7 @@ def test_photographs_alone_give_the_shape():
     assert sides(ours.xyz_m) == pytest.approx(sides(theirs.xyz_m), abs=1e-7)
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.0, 0.1])
 def test_control_observations_and_images_are_enough(share):
     survey, truth = photographed(photos=12, seed=5)
@@ -168,6 +168,7 @@ def test_plumb_lines_and_an_azimuth_turn_a_free_piece():
     assert np.abs(off).max() < 1e-4 or np.abs(mirrored[:2]).max() < 1e-4  # up or upside down
 
 
+@pytest.mark.slow
 def test_three_photos_of_a_plane():
     xyz = cloud(4) * [1, 0, 1]
     survey, _ = seen_from(xyz, THREE, np.zeros(3), 0.003)
@@ -215,7 +216,7 @@ def test_bad_start_values_of_all_photos_are_replaced():
     assert adjust(found).xyz_m == pytest.approx(adjust(survey).xyz_m, abs=1e-7)
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("turn_deg", [0, 40, 180])
 def test_nominal_coordinates_in_another_frame_than_control(turn_deg):
     """Nominal places are decimetres off and turned against the control, which decides."""
@@ -339,7 +340,7 @@ def test_large_surveys_start_from_nothing(photos, points, blunders, figure):
     assert np.abs(found.photos.xyz_m - stations).max() < 0.1
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1.0, 10.0, 40.0])
 def test_one_oriented_photo_and_a_coordinate_of_another(scale):
     """Simulation: the other photo's x alone says how large all is, whatever unit it comes in."""

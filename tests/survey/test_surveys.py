@@ -95,6 +95,7 @@ def test_variance_factors_of_groups(adjustment):
         assert group.factor**2 * group.redundancy == pytest.approx(square, rel=1e-9)
 
 
+@pytest.mark.slow
 @settings(max_examples=30)
 @given(
     st.lists(st.tuples(st.integers(0, 4), st.floats(-5, 5), st.floats(0.1, 3)), min_size=1),
@@ -144,6 +145,7 @@ def repeated(measurements, times, scatter, rng):
     return replace(measurements, image_points=images, readings=(tapes,))
 
 
+@pytest.mark.slow
 def test_averaging_is_adjusting_all_readings(photos):
     """Property: the same unknowns, covariance, sum of squares, redundancy and global test."""
     measurements = repeated(photos[0], 3, 1.0, np.random.default_rng(5))
@@ -198,6 +200,7 @@ def test_scatter_that_contradicts_its_sds_is_reported(photos):
                for one in rough.warnings)  # fmt: skip
 
 
+@pytest.mark.slow
 def test_check_rows_change_nothing(photos, adjustment):
     """Property: with readings and points to compare, every adjusted number stays, and the
     differences are those of the geometry."""
@@ -268,6 +271,7 @@ def test_blunders_are_set_aside_and_listed(photos):
     assert any("the global test fails: sigma0" in str(one) for one in kept.warnings)
 
 
+@pytest.mark.slow
 def test_tapes_are_corrected_by_their_certificate(photos, adjustment):
     """Closed form: (10 + 0.002)(1 + 50e-6)(1 + 11.5e-6 x 12) m; and in a whole survey."""
     tool = Instrument("tape 1", "tape", 50e-6, 0.002, 20.0, 11.5e-6, 2e-5)
@@ -287,6 +291,7 @@ def test_tapes_are_corrected_by_their_certificate(photos, adjustment):
     assert value == pytest.approx(measurements.readings[0].value[0], abs=1e-12)
 
 
+@pytest.mark.slow
 def test_causes_are_effects_of_one_instrument_sd(photos):
     """Second method: adjusted again with the a-priori value shifted by one standard uncertainty."""
     tool = Instrument("tape 1", "tape", u_scale=2e-4, u_offset_m=5e-4)
@@ -309,6 +314,7 @@ def test_causes_are_effects_of_one_instrument_sd(photos):
     assert np.linalg.eigvalsh(rest).min() > -1e-12
 
 
+@pytest.mark.slow
 def test_a_posteriori_scale_is_that_of_sigma0(photos, adjustment):
     """Closed form: covariances and causes times sigma0 squared and sigma0."""
     found = adjust_survey(replace(photos[0], settings=AdjustmentSettings(scale="a_posteriori")))
@@ -371,6 +377,7 @@ def test_stations_are_not_of_the_wall():
     assert not {one.station for one in measurements.setups} & set(points.names)
 
 
+@pytest.mark.slow
 def test_a_point_with_one_ray_is_set_aside(photos):
     images = photos[0].image_points
     keep = np.ones(len(images.photo), dtype=bool)
@@ -523,7 +530,7 @@ def test_nothing_to_adjust_is_refused():
         adjust_survey(Measurements())
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_statistics_of_simulated_surveys(seed):
     """Simulation: points within their sds, chi-square of 144 coordinates in its 99.9 % bounds."""

@@ -24,7 +24,7 @@ def stations():
     return by_instruments()[0]
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [by_photographs, by_instruments])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_sound_survey_is_not_doubted(make, seed):
@@ -112,6 +112,7 @@ def test_one_point_under_two_names(photos):
     assert "X26" in text
 
 
+@pytest.mark.slow
 def test_a_name_spelt_in_another_way(photos):
     images = photos.image_points
     first = images.point.index("P26")

@@ -48,7 +48,7 @@ def test_residuals_of_zero_do_not_make_coordinates_exact():
     assert np.trace(found.full_covariance_m2(["C"])) > 1e-7
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [by_photographs, by_instruments])
 @pytest.mark.parametrize("scale", ["a_priori", "a_posteriori"])
 def test_surveys_without_noise_have_a_record(make, scale):

@@ -311,7 +311,7 @@ def test_two_sets_of_one_station_are_one_ray(stations):
     assert f"point {lone[0]} has too few observations" in text
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_agreeing_reading_is_taken_back(seed):
     """Property: six rays to one point, two of them wrong; whatever is out disagrees in the end."""
@@ -391,7 +391,7 @@ def corners(error_m, seed=6):
     return Measurements(control=control, readings=(tapes,))
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("error_m", [0.015, 0.025, 0.06])
 def test_every_held_coordinate_that_explains_as_much_is_named(error_m):
     """Second method: each of the eight is released by hand, and what fits within 10.8 is named."""
@@ -419,6 +419,7 @@ def test_wrong_corner_that_costs_readings_is_questioned():
     assert "x of B is held fixed at 100.2000, but the readings give " in text
 
 
+@pytest.mark.slow
 def test_held_point_may_be_wrong_instead_of_its_reading():
     """Property: what was rejected is told with the held coordinates that explain it as well."""
     measurements = corners(0.0)

@@ -118,6 +118,7 @@ def touched(tangents, poses):
     return touch(tangents, poses, zero_z_m=0.0, nominal_m=6.5)
 
 
+@pytest.mark.slow
 def test_tangents_touch_the_wall():
     """Exact geometry: a leaning circle; heights to a centimetre, for the wall leans."""
     tangents, poses = known()
@@ -159,6 +160,7 @@ def test_what_a_pose_moves():
         )
 
 
+@pytest.mark.slow
 def test_without_a_zenith_angle_the_sight_is_at_its_level():
     tangents, poses = known()
     blank = replace(tangents, zenith_rad=np.full(len(tangents), np.nan))
@@ -185,6 +187,7 @@ def test_excess_of_convex_walls_is_that_of_the_perimeter():
     assert tangent_excess(amplitudes_of(), 6.5, [0.5])[0, 0] < 1e-12
 
 
+@pytest.mark.slow
 def test_excess_of_settlement_grows_with_the_square_of_the_height():
     """Closed form: mean of p - R is sum k^2 c_k^2 / (4 R), c_k in proportion to the height."""
     size, modes = 3e-4, np.arange(2.0, 13.0)

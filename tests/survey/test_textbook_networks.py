@@ -55,6 +55,7 @@ def test_printed_coordinates_and_sds(name, figure):
     assert sd < published.get("sd_mm", SD_MM) + 1e-9
 
 
+@pytest.mark.slow
 def test_printed_orientation_of_two_photographs():
     """Published: projection centres to 0.5 mm, angles to 1e-6 deg, sds to half a unit."""
     adjustment = adjust_survey(measured("santitamnont-2022-two-photos"))

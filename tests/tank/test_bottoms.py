@@ -215,6 +215,7 @@ def survey(scale=1.0, lift=0.0):
     return surveyed_bottom(footprint, points, 0.001)
 
 
+@pytest.mark.slow
 def test_derivatives_of_a_surveyed_bottom():
     """By the level and by what is surveyed: all points lifted, all plan coordinates stretched."""
     part, levels = survey(), np.array([-0.11, -0.06, -0.021, 0.005, 0.3])

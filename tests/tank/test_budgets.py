@@ -96,6 +96,7 @@ def test_declared_reading_replaces_the_default(tmp_path):
     assert not any(one.is_default for one in reading)
 
 
+@pytest.mark.slow
 def test_a_course_height_moves_the_joints_above_it(tmp_path):
     """Courses of other radii: the area below a joint less that above it, against a moved joint."""
     radii = [6.50, 6.49, 6.47]

@@ -158,7 +158,7 @@ def test_no_dip_between_rows_is_worse(minimum):
         assert relative <= found.relative.relative * (1 + TOLERANCE)
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("minimum", MINIMA)
 def test_the_bound_holds_between_rows_where_k_changes(minimum, figure):
     excess = []
@@ -268,7 +268,7 @@ def test_empty_deliveries_hold_no_relative_limit():
     assert worst_deliveries(table, 4.0).relative.relative == pytest.approx(K95 * 0.1 / 200)
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("few_dof", [False, True])
 def test_least_delivery_height_is_where_limit_holds(few_dof):
     table = tank(70, 1, few_dof)
@@ -315,6 +315,7 @@ def brute_by_rows(table, minimum):
     return best
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("n", [476, pytest.param(draws(3801, 9501), marks=pytest.mark.study)])
 @pytest.mark.parametrize("few_dof", [False, True])
 def test_a_large_table_agrees_with_all_its_pairs_of_rows(n, few_dof, figure):

@@ -294,6 +294,7 @@ def test_millimetre_rows_only_where_they_are_needed(figure):
     )
 
 
+@pytest.mark.slow
 def test_the_fewest_rows_are_chosen():
     """Second method: every step and pair of steps of the ladder, tried one by one."""
     bound = 0.0005

@@ -295,6 +295,7 @@ def test_a_hollow_a_heap_and_a_turned_mesh():
     assert mesh_part(touching).volume_m3([1.0])[0] == pytest.approx(1.125)
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(("many", "bodies"), [(40, 40), (999, None)])
 def test_nested_hollows_are_separated_or_refused(many, bodies):
     """Closed form: shells of alternating sign; of a thousand in one another nobody waits."""

@@ -73,6 +73,7 @@ def test_equal_rings_are_one_cylinder(tilt, direction):
     assert np.abs(found["ring_axes"].sum(axis=1)).max() < 1e-9  # all of them: the tank as a whole
 
 
+@pytest.mark.slow
 def test_tilted_rings_against_meshes_that_trimesh_cuts(figure):
     """Second method: each ring a prism of 1440 sides and of the circle's area, cut by the plane."""
     tilt, corners = np.arctan(LAPPED.tilt), 2 * np.pi / 1440

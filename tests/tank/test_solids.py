@@ -345,7 +345,7 @@ def test_level_ellipsoidal_ends_second_method(depth, figure):
     assert worst.max() < 1e-12
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS[1:])
 def test_more_nodes_change_nothing(kind, figure):
     """24 nodes a panel against 150, surfaces near and far from tangent: volumes and surfaces."""

@@ -149,6 +149,7 @@ def test_simple_forms_are_reproduced_to_the_wall(height):
     )
 
 
+@pytest.mark.slow
 def test_a_leaning_shell_slides_the_points_along_its_axis():
     """Property: the same points slid beforehand, upright."""
     sounded = points(lambda plan: 0.5 - 0.15 * np.hypot(*plan.T) / 6.5)

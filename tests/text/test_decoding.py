@@ -57,7 +57,7 @@ def test_a_job_is_the_same(tmp_path, encode):
     assert job.tank == other.tank
 
 
-@pytest.mark.slow(after=2)
+@pytest.mark.slow
 def test_a_former_table_is_read_by_history_and_compare(tmp_path, capsys, example_record, encode):
     table = "height_m,volume_m3\n" + "".join(f"{k / 10:.1f},{13.2 * k:.3f}\n" for k in range(95))
     (tmp_path / "former.csv").write_bytes(encode(table))

@@ -341,6 +341,7 @@ def test_what_was_done_at_once_is_taken_back_at_once(folder):
     assert not made.draft.undo()
 
 
+@pytest.mark.slow
 def test_a_run_can_be_stopped(folder, tmp_path):
     run, heard = Run(folder, tmp_path / "out", papers=False), []
 

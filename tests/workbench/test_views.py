@@ -371,6 +371,7 @@ def printed(answer):
     return [unescape(re.sub("<[^>]+>", "", cell)) for cell in re.findall(r"<td.*?</td>", answer)]
 
 
+@pytest.mark.slow
 def test_a_typed_ticket_is_that_of_the_result(result, paper, quantity):
     from tankcal.text.digits import format_with_u
 
@@ -385,6 +386,7 @@ def test_a_typed_ticket_is_that_of_the_result(result, paper, quantity):
     assert not any(remark.value for remark in quantity.remarks.values())
 
 
+@pytest.mark.slow
 def test_a_stock_needs_no_opening(result, paper, quantity):
     from tankcal.text.digits import format_with_u
 
@@ -397,6 +399,7 @@ def test_a_stock_needs_no_opening(result, paper, quantity):
     assert paper.words["ticket"]["states"]["moved"] not in quantity.answer.value
 
 
+@pytest.mark.slow
 def test_a_typed_zero_is_an_entry(result, paper, quantity):
     """A blank takes the assumption or the default; 0 does not."""
     from tankcal.text.digits import format_with_u
@@ -450,6 +453,7 @@ def test_an_entry_that_is_no_number_is_refused(quantity, typed):
     assert "<b>" not in quantity.remarks["closing.dip_m"].value
 
 
+@pytest.mark.slow
 def test_a_slip_is_told_beside_its_field(paper, quantity):
     quantity.entries["product.sw_percent"].value = "0.0005"
     assert "0" + paper.marks.decimal + "005" in quantity.remarks["product.sw_percent"].value
