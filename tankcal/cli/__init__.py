@@ -18,6 +18,7 @@ from tankcal.terminal.showing import (
     complain,
     failure,
     language_of_run,
+    prepare_for_small_work,
     print_json,
     say,
     say_in_language,
@@ -86,6 +87,7 @@ def main(arguments=None):
             return 0
     try:
         with raise_at_signals():
+            prepare_for_small_work()
             return options.command(options) or 0
     except TankcalError as error:
         if getattr(options, "machine", False):

@@ -10,7 +10,6 @@ from tankcal.messages import message, printable
 from tankcal.terminal.showing import (
     Progress,
     language_of_run,
-    prepare_for_small_work,
     print_paths,
     say,
     speak,
@@ -22,7 +21,6 @@ HEAD_BYTES = 200  # start of a file that identifies a record
 
 def parameters(options):
     """Test which additional parameters are significant."""
-    prepare_for_small_work()
     from tankcal.calibration.interiors import count_sets
     from tankcal.calibration.parameters.analysis import analyse_job, analyse_record
     from tankcal.calibration.parameters.judgement import Choices
@@ -51,7 +49,6 @@ def parameters(options):
 
 def compare(options):
     """Compare all pairs of calibrations."""
-    prepare_for_small_work()
     from tankcal.calibration.stability.comparison import compare as compare_calibrations
     from tankcal.calibration.stability.fits import parse_grid, parse_terrain
     from tankcal.job.calibrations import choose, read_cameras, with_pixels
@@ -80,7 +77,6 @@ def compare(options):
 
 def influence(options):
     """Compare the adjustments of one survey with several calibrations."""
-    prepare_for_small_work()
     from tankcal.calibration.influence.runs import influence as compute_influence
     from tankcal.job.calibrations import read_cameras
     from tankcal.record.camera_analyses import plain_influence
@@ -103,7 +99,6 @@ def influence(options):
 
 def check(options):
     """Evaluate differences at check points with a table of limits."""
-    prepare_for_small_work()
     from tankcal.calibration.product import limits
     from tankcal.calibration.product.check import check_product
     from tankcal.calibration.product.differences import collect_differences, read_differences
@@ -258,7 +253,6 @@ def _write_new(target, text):
 
 def read(options):
     """Measure targets in photographs and write image_points.csv."""
-    prepare_for_small_work()
     from tankcal.calibration.targets import TargetSettings, read_photographs
 
     speak(options.language)

@@ -8,7 +8,6 @@ from tankcal.terminal.arguments import add_language, parse_count, parse_several,
 from tankcal.terminal.showing import (
     Progress,
     marks,
-    prepare_for_small_work,
     print_paths,
     say,
     speak,
@@ -86,7 +85,6 @@ def add(commands):
 
 
 def _plan(options):
-    prepare_for_small_work()
     if (Path(options.plan) / "upkeep.toml").is_file():
         _plan_upkeep(options)
         return

@@ -11,7 +11,6 @@ from tankcal.terminal.showing import (
     Progress,
     add_json,
     marks,
-    prepare_for_small_work,
     print_doubts,
     print_json,
     print_paths,
@@ -127,7 +126,6 @@ def _compute(
 
     `papers` is (letterhead or None, whether to write the reports); `tell` prints the results.
     """
-    prepare_for_small_work()
     show = Progress(quiet)
     job = read_job(source, show, only=only)
     from tankcal.report import outputs

@@ -8,7 +8,6 @@ from tankcal.terminal.arguments import add_language
 from tankcal.terminal.showing import (
     Progress,
     add_json,
-    prepare_for_small_work,
     print_json,
     say,
     speak_of_record,
@@ -51,7 +50,6 @@ def add(commands):
 
 
 def _verify(options):
-    prepare_for_small_work()
     speak_of_record(options.language, options.results)
     from tankcal.report.verification import verify
 

@@ -165,7 +165,7 @@ def test_want_of_memory_has_its_line(monkeypatch, capsys, error):
         raise error
 
     monkeypatch.setattr("tankcal.cli.running._run", fail)
-    monkeypatch.setattr("tankcal.cli.running.prepare_for_small_work", fail)
+    monkeypatch.setattr("tankcal.cli.prepare_for_small_work", fail)
     assert main(["demo", "--quiet"]) == 2
     assert "not enough memory" in capsys.readouterr().err
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from tankcal.errors import InputError, Problem, TankcalError, reason_of
 from tankcal.messages import message
 from tankcal.products.app.people import ROLES
-from tankcal.terminal.showing import language_of_run, prepare_for_small_work, say, speak
+from tankcal.terminal.showing import language_of_run, say, speak
 from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import load_words
 
@@ -118,7 +118,6 @@ def run_app(options):
             address=options.address,
         )
         raise InputError(Problem("--address", expected))
-    prepare_for_small_work()
     # Behind a server that encrypts, other machines reach a local address, too.
     people = None if is_local and not options.behind_tls else serving.People(users)
     site = serving.Site(options.workspace or serving.default_workspace(), people=people)

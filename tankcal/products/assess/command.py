@@ -7,7 +7,6 @@ from tankcal.terminal.showing import (
     Progress,
     add_json,
     language_of_run,
-    prepare_for_small_work,
     print_json,
     print_paths,
     say,
@@ -47,7 +46,6 @@ def add(commands):
 
 
 def _assess(options):
-    prepare_for_small_work()
     speak(options.language)
     from tankcal.products.assess.assessing import assess, plain_assessment
     from tankcal.products.assess.paper import DOCUMENT, AssessmentPaper

@@ -16,7 +16,6 @@ from tankcal.terminal.showing import (
     add_json,
     complain,
     language_of_run,
-    prepare_for_small_work,
     print_json,
     print_paths,
     say,
@@ -112,7 +111,6 @@ def add(commands):
 
 
 def _batch(options):
-    prepare_for_small_work()
     speak(options.language)
     from tankcal.products.batch.options import Options, parse_steps
     from tankcal.products.batch.running import run_batch

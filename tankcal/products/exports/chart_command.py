@@ -7,7 +7,6 @@ from tankcal.messages import message, printable
 from tankcal.terminal.arguments import add_language, parse_several
 from tankcal.terminal.showing import (
     add_json,
-    prepare_for_small_work,
     print_json,
     say,
     speak_of_record,
@@ -60,7 +59,6 @@ def add(commands):
 
 
 def _chart(options):
-    prepare_for_small_work()
     from tankcal import record as records
     from tankcal.report.outputs import record_file
     from tankcal.report.station_chart import write_chart

@@ -8,7 +8,6 @@ from tankcal.terminal.arguments import add_language, parse_positive, parse_sever
 from tankcal.terminal.showing import (
     add_json,
     language_of_run,
-    prepare_for_small_work,
     print_json,
     say,
     speak,
@@ -68,7 +67,6 @@ def add(commands):
 
 
 def _export(options):
-    prepare_for_small_work()
     speak(options.language)
     if options.list:
         return _list(options)

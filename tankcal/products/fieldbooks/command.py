@@ -13,7 +13,6 @@ from tankcal.terminal.arguments import add_language, parse_positive, refuse_argu
 from tankcal.terminal.showing import (
     add_json,
     complain,
-    prepare_for_small_work,
     print_json,
     say,
     say_in_language,
@@ -135,7 +134,6 @@ def _time(text):
 
 
 def _import(options):
-    prepare_for_small_work()
     from tankcal.terminal.input_language import read_job_language
 
     options.out = options.out or _folder_here(options.names)

@@ -9,7 +9,6 @@ from tankcal.terminal.showing import (
     add_json,
     language_of_run,
     marks,
-    prepare_for_small_work,
     print_paths,
     print_saved,
     say,
@@ -47,7 +46,6 @@ def add(commands):
 
 
 def _gauge(options):
-    prepare_for_small_work()
     speak(options.language)
     if options.new:
         from tankcal.products.gauge.reading import write_starter

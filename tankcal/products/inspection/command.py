@@ -6,7 +6,6 @@ from tankcal.terminal.showing import (
     Progress,
     add_json,
     language_of_run,
-    prepare_for_small_work,
     print_saved,
     say,
     speak,
@@ -73,7 +72,6 @@ def add(commands):
 def _inspect(options):
     from tankcal.terminal.input_language import read_job_language, read_record_language
 
-    prepare_for_small_work()
     speak(
         options.language
         or read_record_language(options.source)

@@ -9,7 +9,6 @@ from tankcal.terminal.showing import (
     add_json,
     language_of_run,
     marks,
-    prepare_for_small_work,
     print_paths,
     print_saved,
     say,
@@ -169,7 +168,6 @@ def _make(options):
     from tankcal.record.intercomparison import TRUTH
     from tankcal.report.folders import replace_folder
 
-    prepare_for_small_work()
     speak(options.language)
     out = Path(options.directory)
     _refuse_existing(out)
@@ -216,7 +214,6 @@ def _answer(options):
     from tankcal.products.intercomparison.package import write_files
     from tankcal.report.folders import replace_folder
 
-    prepare_for_small_work()
     speak(options.language)
     _refuse_existing(options.out)
     manifest = _package(options.package)
@@ -231,7 +228,6 @@ def _answer(options):
 
 
 def _score(options):
-    prepare_for_small_work()
     speak(options.language)
     from tankcal.products.intercomparison.scoring import score_folders
     from tankcal.record.schema import to_plain

@@ -3,7 +3,7 @@
 from tankcal.errors import InputError, Problem, problem_of
 from tankcal.messages import message
 from tankcal.terminal.arguments import add_language, parse_positive
-from tankcal.terminal.showing import add_json, prepare_for_small_work, print_json, say, speak
+from tankcal.terminal.showing import add_json, print_json, say, speak
 
 MOST_FINDINGS = 50  # that are shown at once
 
@@ -46,7 +46,6 @@ def add(commands):
 
 
 def _lint(options):
-    prepare_for_small_work()
     speak(options.language)
     from tankcal.products.linter.linting import lint
     from tankcal.products.linter.totals import Nominal

@@ -10,7 +10,6 @@ from tankcal.terminal.showing import (
     add_json,
     language_of_run,
     marks,
-    prepare_for_small_work,
     print_json,
     print_paths,
     say,
@@ -60,7 +59,6 @@ def add(commands):
 
 
 def _ticket(options):
-    prepare_for_small_work()
     speak_of_record(options.language, options.record)
     from tankcal.products.quantity.reading import read_tickets
     from tankcal.products.quantity.results import rows_of, write_rows

@@ -8,7 +8,6 @@ from tankcal.terminal.arguments import add_language, parse_number, parse_several
 from tankcal.terminal.showing import (
     add_json,
     language_of_run,
-    prepare_for_small_work,
     print_json,
     say,
     speak_of_record,
@@ -68,7 +67,6 @@ def add(commands):
 
 
 def _standard(options):
-    prepare_for_small_work()
     from tankcal.products.quantity.standard_table import compute_standard_table
     from tankcal.products.quantity.table import read_table
     from tankcal.report.outputs import record_file

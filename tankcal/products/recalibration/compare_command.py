@@ -7,7 +7,6 @@ from tankcal.terminal.showing import (
     add_json,
     language_of_run,
     marks,
-    prepare_for_small_work,
     print_saved,
     say,
     speak_of_record,
@@ -62,7 +61,6 @@ def add(commands):
 
 
 def _compare(options):
-    prepare_for_small_work()
     speak_of_record(options.language, options.new, options.old)
     from tankcal.products.recalibration.comparison import Asked, compare_files
     from tankcal.record.schema import to_plain

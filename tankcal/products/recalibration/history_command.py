@@ -7,7 +7,6 @@ from tankcal.terminal.showing import (
     add_json,
     language_of_run,
     marks,
-    prepare_for_small_work,
     print_saved,
     say,
     speak_of_record,
@@ -72,7 +71,6 @@ def add(commands):
 
 
 def _history(options):
-    prepare_for_small_work()
     speak_of_record(options.language, *options.sources)
     from tankcal.products.recalibration.history_inputs import history_of_files
     from tankcal.record.schema import to_plain

@@ -7,7 +7,6 @@ from tankcal.terminal.arguments import add_language, parse_positive
 from tankcal.terminal.showing import (
     language_of_run,
     marks,
-    prepare_for_small_work,
     print_paths,
     say,
     speak_of_record,
@@ -65,7 +64,6 @@ def add(commands):
 
 
 def _read_table(options):
-    prepare_for_small_work()
     speak_of_record(options.language, options.file)
     from tankcal.products.recalibration.read_table import read_table
     from tankcal.report.table_job import refuse_foreign_job, write_job

@@ -7,7 +7,6 @@ from tankcal.messages import message
 from tankcal.terminal.arguments import add_language
 from tankcal.terminal.showing import (
     add_json,
-    prepare_for_small_work,
     print_json,
     say,
     speak,
@@ -39,7 +38,6 @@ def add(commands):
 
 
 def _register(options):
-    prepare_for_small_work()
     if options.issue:
         speak_of_record(options.language, *options.issue)
     else:

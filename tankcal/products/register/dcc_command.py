@@ -6,7 +6,7 @@ from pathlib import Path
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message, printable
 from tankcal.terminal.arguments import add_language
-from tankcal.terminal.showing import language_of_run, prepare_for_small_work, speak
+from tankcal.terminal.showing import language_of_run, speak
 
 
 def add(commands):
@@ -27,7 +27,6 @@ def add(commands):
 
 
 def _show(options):
-    prepare_for_small_work()
     speak(options.language)
     from tankcal.report.dcc.viewer import certificate_blocks, read_certificate
     from tankcal.report.folders import replace_file

@@ -10,7 +10,6 @@ from tankcal.terminal.showing import (
     add_json,
     language_of_run,
     marks,
-    prepare_for_small_work,
     print_paths,
     print_saved,
     say,
@@ -73,7 +72,6 @@ def add(commands):
 
 
 def _upkeep(options):
-    prepare_for_small_work()
     speak(options.language)
     if options.new:
         from tankcal.products.upkeep.reading import write_starter

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.terminal.showing import complain, prepare_for_small_work, say, speak
+from tankcal.terminal.showing import complain, say, speak
 from tankcal.text.shipped import LANGUAGES
 from tankcal.version import install_command
 
@@ -85,5 +85,4 @@ def _notebook(options):
             )
         )
         return
-    prepare_for_small_work()
     serving.open_lab(path)
