@@ -254,8 +254,14 @@ class Objects:
         return self.pdf[start + len(head) : self.pdf.index(b"\nendobj", start)]
 
     def with_contents(self, changed):
-        """Return the PDF with new contents of some objects, {number: bytes}."""
-        first = min(self.places[number] for number in changed)
+        """Return the PDF with new contents of some objects, {number: bytes}.
+
+        Numbers from `len(places)` on, without gaps, add objects.
+        """
+        if not changed:
+            return self.pdf
+        count = len(self.places)
+        first = min(self.places[number] for number in changed if number < count)
         later_objects = sorted((place, i) for i, place in enumerate(self.places) if place >= first)
         entries = bytearray(self.pdf[self.lines : self.lines + _LINE * len(self.places)])
         # Each replaced object shifts all later objects by the change of its length.
@@ -267,11 +273,21 @@ class Objects:
                 pieces += [self.pdf[copied_to:start], changed[number]]
                 copied_to = start + len(former)
                 shift += len(changed[number]) - len(former)
-        position_line = b"startxref\n%d"
-        trailer = self.trailer.replace(
-            position_line % self.table, position_line % (self.table + shift)
-        )
-        return b"".join([*pieces, self.pdf[copied_to : self.lines], entries, trailer])
+        pieces.append(self.pdf[copied_to : self.table])
+        place = self.table + shift
+        for number in sorted(number for number in changed if number >= count):
+            pieces.append(b"%s%s\nendobj\n" % (head_of(number), changed[number]))
+            entries += b"%010d 00000 n\r\n" % place
+            place += len(pieces[-1])
+            count += 1
+        head, trailer = self.pdf[self.table : self.lines], self.trailer
+        for key, former, new in (
+            (b"startxref\n%d", self.table, place),
+            (b"/Size %d", len(self.places), count),
+        ):
+            trailer = trailer.replace(key % former, key % new)
+        head = head.replace(b"0 %d" % len(self.places), b"0 %d" % count)
+        return b"".join([*pieces, head, entries, trailer])
 
 
 def objects_of(pdf):

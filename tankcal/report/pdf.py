@@ -23,13 +23,13 @@ from tankcal.messages import printable
 from tankcal.report import attachments
 from tankcal.report.attachments import with_signature_field
 from tankcal.report.blocks import WEB_ONLY
+from tankcal.report.composed_pages import LONG, compose_pages, is_composed, sample_rows
 from tankcal.report.plain_formulas import formula_nodes
 from tankcal.text.shipped import shipped_folder
 
 STANDARDS = ["a-3a", "ua-1"]  # archival PDF/A-3a and accessible PDF/UA-1
 PLACES = ("asked", "tables", "no")  # blocks that request their position on the page (page.typ)
 UNSETTLED = "did not converge"  # text in typst's warning that positions are not final
-LONG = 5000  # rows of a long table; two such documents at a time would need gigabytes
 FORGETTING = 12  # compilations after which typst discards unused cached data
 _ALONE = Lock()  # held while a document with a long table is typeset
 IN_A_PROCESS = """
@@ -47,7 +47,7 @@ except TankcalError as error:
 # An escaped backslash, which is kept, or a control character in JSON notation.
 _CONTROL_IN_JSON = re.compile(r"(\\\\)|\\u00[01][0-9a-f]|\\[bf]|[\x7f-\x9f]")
 # Cells of numbers, which stay on one line.
-_ON_ONE_LINE = re.compile(r"[0-9.,+*\N{MINUS SIGN}\N{NARROW NO-BREAK SPACE}]*")
+_ON_ONE_LINE = re.compile(r"[0-9.,+*\N{MINUS SIGN}\N{EN DASH}\N{NARROW NO-BREAK SPACE}]*")
 FONT_FILES = ("STIXGeneral*.ttf", "DejaVuSerif*.ttf", "DejaVuSans.ttf")
 
 
@@ -83,12 +83,11 @@ def pdf(blocks, folder=".", again=False, packed=None):
     attached = attachments.contents(blocks, folder)
     files, blocks = _pictures_as_files(blocks)
     files["main.typ"] = (shipped_folder("report_templates") / "page.typ").read_bytes()
-    files["blocks.json"] = _spell_controls(json.dumps(blocks, ensure_ascii=False)).encode("utf-8")
-    long = any("table" in block["kind"] and len(block["rows"]) > LONG for block in blocks)
-    with _ALONE if long else nullcontext():
-        content = _set(files, attached, _timestamp(blocks[0]["date"]), packed)
-        if long and not again:
-            _forget()
+
+    def typeset(attached_files):
+        return _typeset(files | attached_files, blocks, _timestamp(blocks[0]["date"]), again)
+
+    content = _set(typeset, attached, packed)
     field = next((block["field"] for block in blocks if block.get("field")), None)
     return with_signature_field(content, field) if field else content
 
@@ -104,22 +103,43 @@ def _spell_control(match):
     return json.dumps(printable(json.loads(f'"{match[0]}"')))[1:-1]
 
 
-def _set(files, attached, timestamp, packed):
+def _set(typeset, attached, packed):
     """Typeset the pages with the digests of attached files and replace the digests by the files.
 
     If the PDF has an unexpected form, the typesetter embeds the files itself.
     """
     if not attached:
-        return _compile(files, timestamp)
-    digests = {f"attached-{name}": digest.encode() for name, (digest, _) in attached.items()}
-    draft = _compile(files | digests, timestamp)
+        return typeset({})
+    draft = typeset({f"attached-{name}": digest.encode() for name, (digest, _) in attached.items()})
     content = attachments.hold(draft, dict(attached.values()), packed or attachments.Packed())
     if content is None:
-        whole_files = {
-            f"attached-{name}": attached_content for name, (_, attached_content) in attached.items()
-        }
-        content = _compile(files | whole_files, timestamp)
+        content = typeset({f"attached-{name}": whole for name, (_, whole) in attached.items()})
     return content
+
+
+def _typeset(files, blocks, timestamp, again):
+    """Typeset the pages; compose those of long tables of numbers from a few typeset pages."""
+    composed = [block for block in blocks if is_composed(block)]
+    if composed:
+        sampled = [
+            block | {"samples": sample_rows(block)} if is_composed(block) else block
+            for block in blocks
+        ]
+        draft = _compile(files | _block_file(sampled), timestamp)
+        if content := compose_pages(draft, composed):
+            return content
+    long = any("table" in block["kind"] and len(block["rows"]) > LONG for block in blocks)
+    with _ALONE if long else nullcontext():
+        content = _compile(files | _block_file(blocks), timestamp)
+        if long and not again:
+            _forget()
+    return content
+
+
+def _block_file(blocks):
+    """File of the blocks that the page style reads."""
+    text = _spell_controls(json.dumps(blocks, ensure_ascii=False))
+    return {"blocks.json": text.encode("utf-8")}
 
 
 def _compile(files, timestamp):
