@@ -260,7 +260,13 @@ class Operation:
         causes = Causes(
             names=tuple(name for group in groups for name in group[1]),
             kinds=tuple(group[0] for group in groups for _ in group[1]),
-            units=tuple(group[2] for group in groups for _ in group[1]),
+            units=tuple(
+                unit
+                for group in groups
+                for unit in (
+                    group[2] if isinstance(group[2], tuple) else (group[2],) * len(group[1])
+                )
+            ),
             sd=np.concatenate([group[3] for group in groups]),
             mean=np.concatenate([group[4] for group in groups]),
         )
@@ -313,7 +319,7 @@ class Operation:
         return Meter(name, meter.factor, **(values | known))
 
     def _level_causes(self, level_m):
-        """(columns (m, c) in m, names, unit, sd) of the gauge: zero, scale, waves of the level."""
+        """(columns (m, c) in m, names, units, sd) of the gauge: zero, scale, waves of the level."""
         prior, high = self.priors, self.stock.table.height_m[-1]
         columns = [np.full(len(level_m), prior["gauge_zero_mm"] / 1000),
                    prior["gauge_scale_ppm"] * 1e-6 * level_m]  # fmt: skip
@@ -329,7 +335,8 @@ class Operation:
                 sd.append(prior["gauge_bend_mm"])
         kept = [place for place, value in enumerate(sd) if value > 0]
         stacked = np.stack(columns, axis=1)[:, kept]
-        return stacked, tuple(names[place] for place in kept), "mm", [sd[place] for place in kept]
+        units = tuple("ppm" if names[place] == "gauge_scale" else "mm" for place in kept)
+        return stacked, tuple(names[place] for place in kept), units, [sd[place] for place in kept]
 
     def _flows(self, steps, warm, years):
         """Metered volumes at the base (n, meters), groups of causes of the meters, their noise."""

@@ -31,9 +31,30 @@ def _plain(name, decimals, unit="", **more):
     return Column(name, unit, decimals=decimals, csv=name, **_SHOWN, **more)
 
 
+def _hour(name):
+    """Column of times to the hour."""
+    return Column(name, text=lambda paper, row: row[name] and f"{row[name].replace('T', ' ')} h",
+                  csv=name, sheet=True, width=16)  # fmt: skip
+
+
+def _digest(name):
+    """Column of a SHA-256, of which papers print the first digits."""
+    return Column(name, text=lambda paper, row: row[name][:DIGEST], csv=name, sheet=True,
+                  width=66, in_sheet={"text": lambda paper, row: row[name]})  # fmt: skip
+
+
 def _text(name, width=18, **more):
     return Column(name, text=lambda paper, row: bearable(str(row[name] or "")), csv=name,
                   sheet=True, width=width, **more)  # fmt: skip
+
+
+def _name_cause(paper, row):
+    """Name of a cause, such as "meter 1" or "gauge_bend_sin_2"."""
+    names, name = paper.words["causes"], row["name"]
+    if name in names:
+        return names[name]
+    kind, _, member = name.partition(" ") if " " in name else name.rpartition("_")
+    return bearable(f"{names[kind]} {member}")
 
 
 ROWS = Table(
@@ -45,7 +66,7 @@ ROWS = Table(
         _number("volume_m3", "U_m3", "m3"),
         _number("U_m3", "U_m3", "m3"),
         _plain("En", 2),
-        Column("is_seen", words="seen", csv="is_seen", sheet=True, width=16),
+        Column("is_seen", words="seen", csv="is_seen", sheet=True, width=20),
     ),
     rows=lambda upkeep: upkeep["rows"],
 )
@@ -66,8 +87,8 @@ METERS = Table(
     (
         _text("name", 12),
         _plain("volume_m3", 1, "m3"),
-        Column("certificate", text=lambda paper, row: paper.word(
-            "texts.traceable" if row["certificate"] else "texts.untraceable"),
+        Column("certificate", text=lambda paper, row: bearable(
+            row["certificate"] or paper.word("texts.untraceable")),
             csv="certificate", sheet=True, width=16),
         _number("prior_percent", "prior_percent"),
         _number("deviation_percent", "U_percent"),
@@ -83,7 +104,7 @@ MONTHS = Table(
         _plain("steps", 0),
         _number("leak_l_h", "U_l_h"),
         _number("U_l_h", "U_l_h"),
-        _plain("detectable_l_h", 3),
+        _number("detectable_l_h", "U_l_h"),
         Column("verdict", words="verdicts", csv="verdict", sheet=True, width=14),
         _number("throughput_percent", "U_percent"),
         _number("U_percent", "U_percent"),
@@ -113,10 +134,23 @@ CLEANING = Table(
         Column("log", words="logs", csv="log", sheet=True, width=14),
         Column("kind", words="findings", csv="kind", sheet=True, width=44),
         _plain("count", 0),
-        _text("first", 16),
-        _text("last", 16),
+        _hour("first"),
+        _hour("last"),
     ),
     rows=lambda upkeep: [row for row in (*upkeep["cleaning"], *upkeep["left_out"]) if row["count"]],
+)
+INPUTS = Table(
+    "upkeep_inputs",
+    (
+        Column("kind", words="logs", heading="log", csv="kind", sheet=True, width=14),
+        _text("file", 26),
+        _plain("rows", 0),
+        _hour("first"),
+        _hour("last"),
+        _digest("sha256"),
+        _digest("chain"),
+    ),
+    rows=lambda upkeep: upkeep["files"],
 )
 SIZES = Table(
     "upkeep_sizes",
@@ -142,10 +176,10 @@ SIZES = Table(
 CAUSES = Table(
     "upkeep_causes",
     (
-        _text("name", 28),
+        Column("name", text=_name_cause, csv="name", sheet=True, width=44),
         _text("unit", 8),
-        _plain("mean", 3),
-        _plain("prior_u", 3),
+        _number("mean", "prior_u"),
+        _number("prior_u", "prior_u"),
         _number("estimate", "u"),
         _number("u", "u"),
     ),
@@ -167,7 +201,7 @@ STEPS = Table(
 FILES = {
     "table.csv": ROWS, "deliveries.csv": DELIVERIES, "meters.csv": METERS, "months.csv": MONTHS,
     "alarms.csv": SUSPECTS, "cleaning.csv": CLEANING, "causes.csv": CAUSES,
-    "sizes.csv": SIZES, "steps.csv": STEPS,
+    "sizes.csv": SIZES, "inputs.csv": INPUTS, "steps.csv": STEPS,
 }  # fmt: skip
 
 
@@ -267,6 +301,7 @@ def pages(paper, folder=None, whole=False):
         paper.show(CLEANING),
         paper.heading("remarks"),
         blocks.listing(_remarks(paper)),
+        paper.show(INPUTS),
     ]
 
 
@@ -280,6 +315,7 @@ def summary_blocks(paper):
         *[paper.show(table) for table in (SUSPECTS, MONTHS, DELIVERIES, METERS, CLEANING)
           if table.rows(upkeep)],
         blocks.listing(_remarks(paper)),
+        paper.show(INPUTS),
     ]  # fmt: skip
 
 
@@ -307,23 +343,19 @@ def _facts(paper):
         ("delivered", paper.number(period["delivered_m3"], "m3", decimals=1)),
         ("chi2", paper.word("texts.chi2", dof=upkeep["fit"]["dof"],
                             chi_square=paper.number(upkeep["fit"]["chi2"], decimals=0))),
+        ("coverage", paper.word("texts.coverage", k=paper.number(upkeep["k"], decimals=2),
+                                probability=paper.percent(upkeep["coverage_probability"]))),
         ("note", upkeep["note"] and bearable(upkeep["note"])),
     ]  # fmt: skip
 
 
 def _remarks(paper):
-    """Warnings, standing statements and input files."""
+    """Warnings and standing statements."""
     upkeep = paper.record
     texts = [paper.warning(warning) for warning in upkeep["warnings"]]
     texts += paper.words["standing"].values()
     texts.append(paper.word("texts.single_steps", count=len(upkeep["steps"]))
                  if upkeep.get("steps") else paper.word("texts.privacy"))  # fmt: skip
-    files = ", ".join(
-        f"{item['file']} {item['sha256'][:DIGEST]}"
-        + (f" ({item['rows']}: {item['first']} – {item['last']})" if item["rows"] else "")
-        for item in upkeep["files"]
-    )
-    texts.append(paper.word("texts.inputs", files=bearable(files)))
     return texts
 
 
@@ -377,7 +409,8 @@ def _sheets(book):
         Sentences(_remarks(paper), title=paper.words["headings"]["remarks"]),
     ]
     yield SheetContent("upkeep_result", parts, landscape=False, widths=(42, 58))
-    for table in (ROWS, DELIVERIES, METERS, MONTHS, SUSPECTS, CLEANING, CAUSES, SIZES, STEPS):
+    for table in (ROWS, DELIVERIES, METERS, MONTHS, SUSPECTS, CLEANING, CAUSES, SIZES, INPUTS,
+                  STEPS):  # fmt: skip
         if table.rows(paper.record):
             yield SheetContent(table.name, [cell_table(book, table)], tab="result")
 
