@@ -38,7 +38,7 @@ def _hour(name):
 
 
 def _digest(name):
-    """Column of a SHA-256, of which papers print the first digits."""
+    """Column of a SHA-256, of which reports print the first digits."""
     return Column(name, text=lambda paper, row: row[name][:DIGEST], csv=name, sheet=True,
                   width=66, in_sheet={"text": lambda paper, row: row[name]})  # fmt: skip
 
