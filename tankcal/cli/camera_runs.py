@@ -36,8 +36,7 @@ def parameters(options):
         analyses = analyse_record(record, choices, **selection)
     else:
         job = _load_job(options.source, show, options.language)
-        if job.measurements is not None:
-            _refuse_several(options, count_sets(job.measurements, **selection))
+        _refuse_several(options, count_sets(job.network, **selection))
         analyses = analyse_job(
             job, choices, **selection, dropping=not options.no_trials, progress=show.part
         )

@@ -92,6 +92,8 @@ class Method:
     accompanies_points : bool
         Whether the readings may be joined with points of a wall. `warnings` and `choices` then also
         deal with the wall of these points.
+    measures_size : bool
+        Whether the readings determine the size of the tank without distances of instruments.
     is_inside : bool
         Whether the readings, without a survey, are sizes of the inside.
     is_supplement : bool
@@ -149,6 +151,7 @@ class Method:
     replaces_points = False
     completes_survey = False
     accompanies_points = False
+    measures_size = False
     is_inside = False
     is_supplement = False
     has_means = False
@@ -598,6 +601,11 @@ def supplement_of(job):
 def accompanying_methods(job):
     """Methods of a `Job` whose readings may be joined with points of its wall."""
     return tuple(method for method in given_methods(job) if method.accompanies_points)
+
+
+def is_size_measured(job):
+    """Whether readings of a `Job` determine its size without distances of instruments."""
+    return any(method.measures_size for method in given_methods(job))
 
 
 def is_sighted(job):

@@ -226,7 +226,7 @@ def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> "Adju
     (167, True)
     """
     _require_job(job, "adjust_job")
-    if job.measurements is None:
+    if not job.has_network:
         raise InputError(
             Problem(
                 "job.toml",

@@ -103,10 +103,8 @@ def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=N
     InputError, SolutionError
         As `chain.run`.
     """
-    adjustment, sights = None, {}
+    adjustment, sights = _adjusted(job, progress) if job.has_network else None, {}
     sighted = [method for method in given_methods(job) if method.is_sighted]
-    if job.measurements is not None:
-        adjustment = _adjusted(job, progress)
     if not sighted and adjustment is not None:
         from tankcal.survey import wall_points
 

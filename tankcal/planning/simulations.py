@@ -322,7 +322,7 @@ def _draw_survey(prediction, rng, blunders):
     job, errors = prediction.plan.job, Errors(rng, blunders)
     sizes = _draw_sizes(job, prediction.result.wall.field.amplitudes, rng)
     wall = DrawnWall(job, sizes, levels_of_readings(job), rng)
-    if job.measurements is not None:
+    if job.has_network:
         job = replace(job, measurements=add_network_errors(job.measurements, errors))
     return wall, set_readings(job, wall, errors)
 

@@ -350,14 +350,8 @@ def _horizontal_details(result):
         tube_offset=(lying.tube_offset_m and tank.tube_offset_m, "m"),
         **_scan_details(result),
         full_capacity=(result.body.parts[0].capacity_m3, "m3"),
-        **(_unmeasured_volumes(tank, result.zero_m) if result.job.rings else {}),
+        **_sizes_by_methods(result),
     )
-
-
-def _unmeasured_volumes(tank, zero_m):
-    """Return the volumes below dip 0 and above the highest dip, which no dip measures."""
-    below = float(tank.volume_m3([zero_m])[0])
-    return {"below_zero": (below, "m3"), "left_at_full": (tank.left_m3, "m3")}
 
 
 def _scan_details(result):

@@ -287,7 +287,7 @@ def survey_of(plan):
         circumferences=len({strap.name for strap in design.straps}),
         strap_readings=read.get("straps", 0),
         lines=count["line"],
-        faces=0 if design.lines is None else design.lines.faces,
+        faces=max(part.faces for part in design.parts),
         offsets=read.get("offsets", 0),
         setups=count["setup"],
         hits=read.get("hits", 0),

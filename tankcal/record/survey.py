@@ -231,7 +231,7 @@ def rejections_of(result):
     else:
         return []
     # Row of targets.csv of each target; targets used with hits have no row in the hits' file.
-    targets = None if result.job.measurements is None else result.job.measurements.targets
+    targets = result.job.network.targets
     target_rows = {} if targets is None else dict(zip(targets.point, targets.rows, strict=False))
     return [
         RejectedPoint(

@@ -13,9 +13,10 @@ from linted_tables import DECIMALS, SHAPES, STEPS
 
 from tankcal.cli import main
 from tankcal.errors import InputError
+from tankcal.products.exports import exporting
 from tankcal.products.exports.exporting import export_record, write_export
 from tankcal.products.exports.profiles import find_profile, shipped_profiles
-from tankcal.record import save
+from tankcal.record import read, save
 from tankcal.tank.dips import table_heights
 
 EDGES = (  # of courses, deadwood, roof and bottoms of the shapes of the linter's tests
@@ -199,6 +200,16 @@ def test_provenance(lying_record, tmp_path):
     save(record, tmp_path / "theory.json")
     said = [one.code for one in export_record(tmp_path / "theory.json", find_profile("csv")).facts]
     assert "export_theoretical" in said
+
+
+@pytest.mark.parametrize(
+    ("method", "is_theoretical"), [("great_circles", False), ("strapping", False), ("radii", True)]
+)
+def test_only_tables_without_a_survey_are_theoretical(tmp_path, method, is_theoretical):
+    save(record_with(*rows(lying, 2.4, 0.05)) | {"points": [], "adjustment": None}, tmp_path / "r")
+    record = replace(read(tmp_path / "r"), surveys={method: object()})
+    said = [fact.code for fact in exporting._provenance(record, "")]
+    assert ("export_theoretical" in said) == is_theoretical
 
 
 def test_critical_zone_stands(tmp_path):

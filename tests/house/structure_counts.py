@@ -28,12 +28,24 @@ METHODS = (
     "hits|tangents|clouds|strapping|straps|lines|rings|great_circles|circles|radii|liquid|ship|"
     "mesh|points|measurements|stadia"
 )
-# `if job.straps`, `kind == "mesh"`, `"liquid" in surveys`: a question that the method should answer
+# `if job.straps`, `kind == "mesh"`, `"liquid" in surveys`: a question that the method answers.
+# Not counted: `job.points.unbound`, a value of known readings; `survey.points`, of a network.
 BRANCH = re.compile(
-    rf"\b(?:job|raw|record|self|result|survey|design|values|tables)\.(?:{METHODS})\b"
-    rf"|(?:kind|surveyed_as)\b[^\n]*'(?:{METHODS}|hit|tangent|cloud|strap|line|ring)'"
-    rf"|'(?:{METHODS})' (?:not )?in\b"
+    rf"\b(?:job|raw|record|result|design|values|tables)\.({METHODS})\b(?!\.)"
+    rf"|\bsurvey\.(?!points)({METHODS})\b(?!\.)"
+    r"|\b(?:kind|surveyed_as) (?:[=!]=|in|not in) [^=]*?"
+    rf"'({METHODS}|hit|tangent|cloud|strap|line|ring)'"
+    rf"|'({METHODS})' (?:not )?in\b"
 )
+OWN_PARTS = {"mesh": {"mesh", "ship"}, "strapping": {"strapping", "straps"}}  # others: the name
+
+
+def asks_for_method(test, module, class_name=""):
+    """Whether a condition asks for a method or kind; a method may ask for its own readings."""
+    package = re.match(r"tankcal\.methods\.(\w+)", module)
+    own = OWN_PARTS.get(package[1], {package[1]}) if package else set()
+    text = re.sub(r"\bself\b", class_name.lower() or "self", test)
+    return any({*groups} - {"", *own} for groups in BRANCH.findall(text))
 
 
 @dataclass
@@ -63,14 +75,16 @@ def read_module(path, root):
     module = Module(
         name, ast.parse(text), len(lines), sum(line.lstrip().startswith("#") for line in lines)
     )
-    used = Counter()
+    used, class_of = Counter(), {}
     for node in ast.walk(module.tree):
+        if isinstance(node, ast.ClassDef):
+            class_of |= dict.fromkeys(ast.walk(node), node.name)
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             module.functions += 1
         elif isinstance(node, ast.Name | ast.Attribute):
             used[node.id if isinstance(node, ast.Name) else node.attr] += 1
         elif isinstance(node, ast.If | ast.IfExp | ast.While):
-            module.branches += BRANCH.search(ast.unparse(node.test)) is not None
+            module.branches += asks_for_method(ast.unparse(node.test), name, class_of.get(node, ""))
     for node in module.tree.body:
         is_private = isinstance(node, ast.FunctionDef) and re.match("_[^_]", node.name)
         if is_private and used[node.name] == 1:

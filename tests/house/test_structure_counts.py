@@ -1,7 +1,7 @@
 """The measures of the structure, on a package whose structure is written here."""
 
 import pytest
-from structure_counts import list_cycles, main, measure, read_package
+from structure_counts import asks_for_method, list_cycles, main, measure, read_package
 
 FILES = {
     "__init__.py": "",
@@ -102,3 +102,22 @@ def test_a_measure_above_its_limit_fails(tmp_path, monkeypatch, capsys, modules)
     (tmp_path / "tankcal" / "tank.py").write_text("import tankcal.adjust\n")
     assert main([]) == 1
     assert "modules in import cycles: 4, limit 2" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("test", "module", "class_name", "asks"),
+    [
+        ("job.straps is None", "tankcal.pipeline.wall", "", True),
+        ("job.straps is None", "tankcal.methods.strapping.wall", "", False),
+        ("job.lines is None", "tankcal.methods.strapping.wall", "", True),
+        ("self.tangents is None", "tankcal.planning.model", "Design", True),
+        ("self.points is None", "tankcal.geometry.sites", "Sites", False),
+        ("job.points.unbound", "tankcal.pipeline.wall", "", False),
+        ("not gathered.survey.points", "tankcal.survey.datum", "", False),
+        ("kind != 'vertical' or form != 'liquid'", "tankcal.job.checks", "", False),
+        ("kind in ('sphere', 'mesh')", "tankcal.job.checks", "", True),
+        ("'radii' not in tables", "tankcal.job.checks", "", True),
+    ],
+)
+def test_a_branch_asks_which_method_is_present(test, module, class_name, asks):
+    assert asks_for_method(test, module, class_name) is asks

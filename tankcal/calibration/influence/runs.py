@@ -44,11 +44,10 @@ def select_camera(job, camera=None):
     Raises InputError if the job has no photographs or no such camera, or if several cameras have
     photos and no name is given.
     """
-    measurements = job.measurements
-    setups = () if measurements is None else measurements.cameras
-    photographed = set() if measurements is None else {item.camera for item in measurements.photos}
-    known = {item.camera.name: item for item in setups if item.camera.name in photographed}
-    if measurements is None or measurements.image_points is None or not known:
+    network = job.network
+    photographed = {item.camera for item in network.photos}
+    known = {item.camera.name: item for item in network.cameras if item.camera.name in photographed}
+    if network.image_points is None or not known:
         raise InputError(
             Problem(
                 "job.toml",

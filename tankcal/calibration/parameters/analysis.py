@@ -139,14 +139,14 @@ def analyse_job(
         If the survey cannot be adjusted.
     """
     progress = progress or (lambda text, done, total: None)
-    if job.measurements is None or not job.measurements.photos:
+    if not job.network.photos:
         raise InputError(
             Problem(
                 "job.toml",
                 message("camera_none_to_judge", "no photographs: there is no camera to test"),
             )
         )
-    photos = {item.name: item.camera for item in job.measurements.photos}
+    photos = {item.name: item.camera for item in job.network.photos}
     refuse_unknown(photos, camera, photo)
     if adjustment is None:
         progress(message("camera_adjusting_all", "adjusting the survey with all parameters"), 0, 1)

@@ -518,3 +518,15 @@ class Job:
     equipment: tuple[Equipment, ...] = ()
     seals: tuple[Seal, ...] = ()
     next_verification: NextVerification | None = None
+
+    @property
+    def has_network(self) -> bool:
+        """Whether the job has measurements that a network adjustment makes into points."""
+        return self.measurements is not None
+
+    @property
+    def network(self) -> "Measurements":
+        """Measurements to be adjusted; without a network, `Measurements` that contain none."""
+        from tankcal.survey.measurements import Measurements  # only jobs with a network load it
+
+        return self.measurements or Measurements()

@@ -14,6 +14,7 @@ from tankcal.errors import Problem
 from tankcal.geometry.circles import taubin_circle
 from tankcal.geometry.shell import course_of
 from tankcal.messages import list_some, message
+from tankcal.methods.base import is_size_measured
 from tankcal.methods.moved_setups import (
     critical_of_ranging,
     moved_or_ranged,
@@ -138,7 +139,7 @@ def _check_assumed_places(job, wall, poses):
         for (name, _), tie in zip(poses.keys, poses.ties, strict=True)
         if tie == WALL and np.isnan(stations.get(setups[name].station, unknown)[:2]).any()
     ]
-    if names and wall.told is not None and job.strapping is None:
+    if names and wall.told is not None and not is_size_measured(job):
         text = message(
             "places_assumed",
             "the stations of set-ups {setups} are blank and were assumed to be evenly spaced; the"

@@ -65,3 +65,9 @@ class RingsMethod(Method):
             "between_sections": "rings",
             "form": "learned",
         }
+
+    def sizes(self, result):
+        # Volumes below dip 0 and above the highest dip, which no dip measures.
+        solid = result.body.parts[0].solid
+        below_m3 = float(solid.volume_m3([result.zero_m])[0])
+        return {"below_zero": (below_m3, "m3"), "left_at_full": (solid.left_m3, "m3")}

@@ -21,6 +21,7 @@ class StrappingMethod(Method):
     tables_with_sds = ("circumferences",)
     replaces_points = True
     accompanies_points = True
+    measures_size = True
     compares_size = True
     comes_last = True
     field_forms = (

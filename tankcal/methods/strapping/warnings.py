@@ -14,7 +14,7 @@ from scipy.special import bdtrc, chdtrc, erf, pdtrc
 from tankcal.adjust import CRITICAL, SD_OVER_MEDIAN
 from tankcal.errors import Problem
 from tankcal.messages import message
-from tankcal.methods.base import completing_method
+from tankcal.methods.base import accompanying_methods, completing_method
 from tankcal.methods.moved_setups import tested
 from tankcal.pipeline.checks.size import (
     allowed_departure_m,
@@ -693,8 +693,9 @@ def _check_single_course(job, straps):
     The other courses are determined relative to this course by reference lines.
     """
     strapped = {reduced_strap.strap.course for reduced_strap in straps.reduced}
-    is_completed = completing_method(job) is not None
-    if job.lines is None or is_completed or len(strapped) > 1 or is_size_declared(job):
+    is_transferred = not all(method.measures_size for method in accompanying_methods(job))
+    is_told = completing_method(job) is not None or is_size_declared(job)
+    if not is_transferred or is_told or len(strapped) > 1:
         return
     text = message(
         "size_told_by_one_course",

@@ -422,9 +422,10 @@ def check_tangents(job, wall, touching):
 
 def _check_scale(job):
     """Problems of a traverse measured with one instrument, without a tape or a bar."""
-    readings = () if job.measurements is None else job.measurements.readings
     names = {setup.instrument for setup in job.tangents.setups.values()}
-    is_alone = len(names) == 1 and "distances" not in {table.table for table in readings}
+    is_alone = len(names) == 1 and "distances" not in {
+        table.table for table in job.network.readings
+    }
     return check_size_told(job, [*names]) if is_alone else ()
 
 

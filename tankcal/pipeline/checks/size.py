@@ -305,19 +305,17 @@ def check_scan(job, scan, top_m):
             diameter_m=diameter,
         )
         problems.append(Problem(origin_of(job.points), text))
-    elif given_sd_m(job.points) is not None and not job.points.from_adjustment:
-        declared_sd_m = given_sd_m(job.points)
-        if scan.noise_m > MISFIT_SDS * declared_sd_m:
-            text = message(
-                "points_beyond_sd",
-                "the points scatter by {noise_mm:.1f} mm (rms) about the best shape of"
-                " {diameter_m:.4g} m diameter, their given sd is {given_mm:.1f} mm: are the sds too"
-                " small, or is it another shape?",
-                noise_mm=1000 * scan.noise_m,
-                diameter_m=diameter,
-                given_mm=1000 * declared_sd_m,
-            )
-            problems.append(Problem(origin_of(job.points), text))
+    elif scan.noise_m > MISFIT_SDS * declared_sd_m(job.points):
+        text = message(
+            "points_beyond_sd",
+            "the points scatter by {noise_mm:.1f} mm (rms) about the best shape of"
+            " {diameter_m:.4g} m diameter, their given sd is {given_mm:.1f} mm: are the sds too"
+            " small, or is it another shape?",
+            noise_mm=1000 * scan.noise_m,
+            diameter_m=diameter,
+            given_mm=1000 * declared_sd_m(job.points),
+        )
+        problems.append(Problem(origin_of(job.points), text))
     return [*problems, *_check_foot(job, scan), *check_reference(job, top_m)]
 
 
@@ -335,11 +333,13 @@ def _check_foot(job, scan):
     return [Problem(origin_of(job.points), text)]
 
 
-def given_sd_m(points):
-    """Return the median declared standard deviation of a coordinate, m; None: not declared."""
+def declared_sd_m(points):
+    """Return the median declared standard deviation of a coordinate, m; infinite without one."""
+    if points.from_adjustment:
+        return np.inf
     if points.covariance_m2 is not None:
         return float(np.sqrt(np.median(points.covariance_m2.diagonal())))
-    return None if points.sd_m is None else float(np.median(points.sd_m))
+    return np.inf if points.sd_m is None else float(np.median(points.sd_m))
 
 
 def check_wall(job, wall):

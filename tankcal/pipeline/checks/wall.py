@@ -24,7 +24,7 @@ from tankcal.errors import Problem
 from tankcal.geometry.field.components import COMPONENTS
 from tankcal.geometry.field.section_noise import bartlett
 from tankcal.messages import list_some, message
-from tankcal.methods.base import given_methods
+from tankcal.methods.base import given_methods, is_size_measured
 from tankcal.pipeline.checks.size import (
     allowed_departure_m,
     inside_radii,
@@ -525,7 +525,7 @@ def check_size_told(job, instruments):
     ------
     Problem
     """
-    if job.strapping is not None or is_size_declared(job):
+    if is_size_measured(job) or is_size_declared(job):
         return
     text = message(
         "size_told_by_distances",

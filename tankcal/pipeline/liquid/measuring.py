@@ -518,25 +518,31 @@ def causes_in_words(named):
 def _cause(verdict):
     """A cause in words, with its size."""
     size, name = verdict.size, verdict.cause.of
-    if verdict.cause.kind == "meter":
-        return message("cause_meter", "the factor of meter {name}, off by {size:+.3f} %",
-                       name=name, size=-100 * size)  # fmt: skip
-    if verdict.cause.kind == "radii":
-        return message("cause_radii", "the radii of the geometry, off by {size:+.1f} mm",
-                       size=-1000 * size)  # fmt: skip
-    if verdict.cause.kind == "dip_zero":
-        return message("cause_dip_zero", "the zero of all dips, off by {size:+.1f} mm",
-                       size=-1000 * size)  # fmt: skip
-    if verdict.cause.kind == "dip":
-        return message("cause_dip", "the dip of row {row}, off by {size:+.1f} mm",
-                       row=name, size=-1000 * size)  # fmt: skip
-    if verdict.cause.kind == "batch":
-        return message("cause_batch", "the batch of row {row}, which lacks {size:+.3f} m3: is a "
-                       "batch missing, or counted twice?", row=name, size=size)  # fmt: skip
-    if verdict.cause.kind == "bottom":
-        return message("cause_bottom", "the volume of the bottom, off by {size:+.3f} m3",
-                       size=-size)  # fmt: skip
-    return _other_cause(verdict, size)
+    match verdict.cause.kind:
+        case "meter":
+            return message("cause_meter", "the factor of meter {name}, off by {size:+.3f} %",
+                           name=name, size=-100 * size)  # fmt: skip
+        case "radii":
+            return message("cause_radii", "the radii of the geometry, off by {size:+.1f} mm",
+                           size=-1000 * size)  # fmt: skip
+        case "dip_zero":
+            return message("cause_dip_zero", "the zero of all dips, off by {size:+.1f} mm",
+                           size=-1000 * size)  # fmt: skip
+        case "dip":
+            return message("cause_dip", "the dip of row {row}, off by {size:+.1f} mm",
+                           row=name, size=-1000 * size)  # fmt: skip
+        case "batch":
+            return message("cause_batch", "the batch of row {row}, which lacks {size:+.3f} m3: is "
+                           "a batch missing, or counted twice?", row=name, size=size)  # fmt: skip
+        case "bottom":
+            return message("cause_bottom", "the volume of the bottom, off by {size:+.3f} m3",
+                           size=-size)  # fmt: skip
+        case "leak":
+            return message("cause_leak", "a valve that passes, {size:+.3f} {unit}", size=size,
+                           unit=leak_unit(verdict.cause))  # fmt: skip
+        case "fahrenheit":
+            return message("cause_fahrenheit", "temperatures in degrees Fahrenheit")
+    return message("cause_swapped", "temperatures at the meter and in the tank that changed places")
 
 
 def is_steady_leak(verdict):
@@ -547,13 +553,3 @@ def is_steady_leak(verdict):
 def leak_unit(cause):
     """Return the unit of the size of a leak for a message."""
     return cause.unit if cause.unit != "m3" else message("m3_a_step", "m3 a step")
-
-
-def _other_cause(verdict, size):
-    """Cause of kind leak, Fahrenheit or exchanged temperatures, in words."""
-    if verdict.cause.kind == "leak":
-        return message("cause_leak", "a valve that passes, {size:+.3f} {unit}", size=size,
-                       unit=leak_unit(verdict.cause))  # fmt: skip
-    if verdict.cause.kind == "fahrenheit":
-        return message("cause_fahrenheit", "temperatures in degrees Fahrenheit")
-    return message("cause_swapped", "temperatures at the meter and in the tank that changed places")

@@ -33,7 +33,7 @@ def wall_changes_of(plan):
     The function returns the new WallPlan.
     """
     result = []
-    for changes in (_straps, _lines, _hits, _tangents, _runs, _certificates):
+    for changes in (_straps, _lines, _hits, _tangents, _first_straps, _runs, _certificates):
         result += changes(plan)
     return result
 
@@ -141,16 +141,15 @@ def _hits(plan):
             yield "drop", "setup", str(number), change_ring(setups=ring.setups - 1)
         for action, name, at in _levels(ring.at_percent):
             yield action, "level", f"{name} ({number})", change_ring(at_percent=at)
-    if design.hits:
-        yield from _first_straps(plan)
 
 
 def _first_straps(plan):
-    """Yield a first strapped course for a plan with a tape and no strap."""
+    """Yield a first strapped course for sights of the wall, a tape and no strap."""
     tapes = plan.raw.registers.get("instruments")
     kinds = {} if tapes is None else {n: entry.get("kind") for n, entry in tapes.entries.items()}
     names = [name for name, kind in kinds.items() if kind and kind.raw == "tape"]
-    if names and not plan.design.straps:
+    is_sighted = any(method.is_sighted for method in given_methods(plan.job))
+    if is_sighted and names and not plan.design.straps:
         first = plan.job.courses[0].name
         straps = tuple(
             PlannedStrap(first, at, 0.5, more=(("instrument", names[-1]),)) for at in USUAL_AT
@@ -186,7 +185,6 @@ def _tangents(plan):
     elif s_mm is not None:
         yield "drop", "bar", ring.bar[0] or bars[0], change_ring(bar=None)
         yield "drop", "ranging", "", change_ring(traverse=(None, s_arcsec))
-    yield from _first_straps(plan)
 
 
 def _even_ring_m(plan, stations):
@@ -219,7 +217,7 @@ def _halve(entry, keys):
 def instruments_in_use(job):
     """Names of the instruments that a Job uses, and of the masters of its tapes."""
     names = set().union(*(method.instruments_in_use(job) for method in given_methods(job)))
-    for readings in () if job.measurements is None else job.measurements.readings:
+    for readings in job.network.readings:
         names |= set(readings.instrument or ())
     return names - {"", None}
 

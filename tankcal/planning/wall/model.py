@@ -36,6 +36,8 @@ class Part:
         Default datum of the network of its set-ups.
     is_wall : bool
         Whether the part determines all courses of a wall without straps.
+    faces : int
+        Faces of the instrument in which each level is read; 0: does not apply.
     sections : dict
         {table that the part generates: section of plan.toml}, where they differ from other parts.
     """
@@ -44,6 +46,7 @@ class Part:
     section = ""
     datum = None
     is_wall = True
+    faces = 0
     sections = MappingProxyType({})
 
 

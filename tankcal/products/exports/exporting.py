@@ -21,6 +21,7 @@ import numpy as np
 from tankcal import record as records
 from tankcal.job.tables import Log
 from tankcal.messages import message
+from tankcal.methods.base import find_method
 from tankcal.products.exports.writing import (
     ON_THE_MARK_M,
     RowRequest,
@@ -34,7 +35,6 @@ from tankcal.units import STANDARD_GRAVITY
 
 POISSON = 0.3  # Poisson's ratio of the shell
 _SAMPLES = 150  # number of levels at which the line is compared with the curve
-_SURVEYS = ("strapping", "lines", "clouds", "hits", "tangents", "liquid", "adjustment")
 
 
 @dataclass(frozen=True)
@@ -445,9 +445,13 @@ def _gauge_line(gauge):
 
 def _is_surveyed(record):
     """Whether any quantity of the tank was measured, not only declared."""
-    if record.job.tank.kind == "mesh":
-        return True
-    return record.points != [] or any(getattr(record, survey) is not None for survey in _SURVEYS)
+    measured = [find_method(name) for name in record.surveys]
+    return (
+        record.job.tank.kind == "mesh"
+        or record.points != []
+        or record.adjustment is not None
+        or any(not method.completes_survey for method in measured)  # former radii are declared
+    )
 
 
 def _tank_line(record):

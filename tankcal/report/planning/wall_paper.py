@@ -228,7 +228,7 @@ def wall_sheets(paper):
             sheets.append(paper.heading(HEADINGS[name]))
         if name in ABOUT:
             sheets.append(paper.paragraph(ABOUT[name]))
-        if name == "sight_lines" and paper.plan.design.lines.faces > 1:
+        if name == "sight_lines" and any(part.faces > 1 for part in paper.plan.design.parts):
             sheets.append(paper.paragraph("wall_faces"))
         if name == "runs":
             instructions = [paper.word(f"forms.{key}") for key in ("tight_how", "batches")]

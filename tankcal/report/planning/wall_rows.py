@@ -71,23 +71,35 @@ COURSES = (
 
 def field_tables_of_wall(plan):
     """Return {name: (rows, columns)} of all tables of the field sheets that have rows."""
-    tables = {
-        "circumferences": (_straps(plan), STRAPS),
+    planned, tables = {part.section for part in plan.design.parts}, {}
+    for section, tables_of_section in _TABLES_OF_SECTIONS.items():
+        if section in planned:
+            tables |= tables_of_section(plan)
+    tables["instruments"] = _instruments(plan), INSTRUMENTS
+    return {name: table for name, table in tables.items() if table[0]}
+
+
+_TABLES_OF_SECTIONS = {  # {section of plan.toml: function that returns its tables}
+    "straps": lambda plan: {"circumferences": (_straps(plan), STRAPS)},
+    "lines": lambda plan: {
         "sight_lines": (_lines(plan), LINES),
         "offsets": (_offsets(plan), OFFSETS),
         "offset_readings": (_offset_readings(plan), _columns_of_offsets(plan)),
+    },
+    "hits": lambda plan: {
         "hit_setups": (_setups(plan), SETUPS),
         "hit_levels": (_hits(plan), HITS),
         "shared_targets": (_ties(plan), TIES),
         "control_targets": (_control(plan), CONTROL),
+    },
+    "tangents": lambda plan: {
         "tangent_stations": (_stations(plan), STANDS),
         "traverse": (_traverse(plan), _columns_of_traverse(plan)),
         "bases": (_bases(plan), BASES),
         "tangents": (_tangents(plan), TANGENTS),
-        "runs": (rows_of_runs(plan), RUNS),
-        "instruments": (_instruments(plan), INSTRUMENTS),
-    }
-    return {name: table for name, table in tables.items() if table[0]}
+    },
+    "runs": lambda plan: {"runs": (rows_of_runs(plan), RUNS)},
+}
 
 
 def _feet(plan):
@@ -99,9 +111,8 @@ def _feet(plan):
 
 
 def _straps(plan):
-    strapping, feet, count = plan.job.strapping, _feet(plan), {}
-    rows = []
-    for strap in () if strapping is None else strapping.straps:
+    feet, count, rows = _feet(plan), {}, []
+    for strap in plan.job.strapping.straps:
         count[strap.name] = count.get(strap.name, 0) + 1
         rows.append(
             {
@@ -119,17 +130,16 @@ def _straps(plan):
 
 
 def _lines(plan):
-    lines = plan.job.lines
     return [
         {"line": line.name, "azimuth_rad": line.azimuth_rad, "instrument": line.instrument}
-        for line in (() if lines is None else lines.lines.values())
+        for line in plan.job.lines.lines.values()
     ]
 
 
 def _offsets(plan):
     """Return a row for each level, with the number of its readings on each line."""
-    lines, feet, rows = plan.job.lines, _feet(plan), {}
-    for offset in () if lines is None else lines.offsets:
+    feet, rows = _feet(plan), {}
+    for offset in plan.job.lines.offsets:
         rows.setdefault(
             (offset.course, offset.level_m),
             {
@@ -146,8 +156,8 @@ def _offsets(plan):
 
 def _offset_readings(plan):
     """Return a row for each reading of a level on a line in the first face."""
-    lines, count, rows = plan.job.lines, {}, []
-    for offset in () if lines is None else lines.offsets:
+    count, rows = {}, []
+    for offset in plan.job.lines.offsets:
         if offset.face == 1:
             place = offset.line, offset.course, offset.level_m
             count[place] = count.get(place, 0) + 1
@@ -166,10 +176,8 @@ def _offset_readings(plan):
 def _columns_of_offsets(plan):
     """Return OFFSET_READINGS without the second face or the number of a reading if not needed."""
     lines = plan.design.lines
-    omitted = set()
-    if lines is not None:
-        omitted |= {"face_2"} if lines.faces == 1 else set()
-        omitted |= {"reading"} if lines.readings == 1 else set()
+    omitted = {"face_2"} if lines.faces == 1 else set()
+    omitted |= {"reading"} if lines.readings == 1 else set()
     return tuple(column for column in OFFSET_READINGS if column.key not in omitted)
 
 
@@ -199,9 +207,8 @@ def _polar(x, y):
 
 
 def _setups(plan):
-    hits = plan.job.hits
-    rows = []
-    for name, setup in {} if hits is None else hits.setups.items():
+    hits, rows = plan.job.hits, []
+    for name, setup in hits.setups.items():
         x, y, _ = hits.stations[setup.station]
         rows.append(
             {
@@ -250,9 +257,6 @@ def _control(plan):
 
 def _stations(plan):
     """Return a row for each station of a traverse, with the distance to its neighbours."""
-    tangents = plan.job.tangents
-    if tangents is None:
-        return []
     places = place_stations(plan.job)
     to_neighbour = {row["setup"]: row["expected_m"] for row in _traverse(plan)}
     return [
@@ -263,7 +267,7 @@ def _stations(plan):
             "expected_m": to_neighbour[name],
             "instrument": setup.instrument,
         }
-        for name, setup in tangents.setups.items()
+        for name, setup in plan.job.tangents.setups.items()
     ]
 
 
@@ -274,8 +278,6 @@ def _readings_of_traverse(plan):
 
 def _traverse(plan):
     """Return a row for each sight between neighbouring stations."""
-    if plan.job.tangents is None:
-        return []
     read = _readings_of_traverse(plan)
     directions, distances = read["directions"], read.get("slope_distances") or read["distances"]
     sights = zip(directions.setup, directions.end, distances.value, strict=True)
@@ -284,15 +286,14 @@ def _traverse(plan):
 
 def _columns_of_traverse(plan):
     """Return TRAVERSE, without distances if only a stadia determines them."""
-    ring = plan.design.tangents
-    is_ranged = ring is not None and ring.traverse[0] is not None
+    is_ranged = plan.design.tangents.traverse[0] is not None
     return tuple(column for column in TRAVERSE if is_ranged or column.key != "distance")
 
 
 def _bases(plan):
     """Return a row for each angle between the ends of a stadia over a neighbouring station."""
     ring = plan.design.tangents
-    if ring is None or ring.bar is None:
+    if ring.bar is None:
         return []
     read, lengths = _readings_of_traverse(plan)["distances"], lengths_of_bars(plan.raw)
     sights = zip(_traverse(plan), read.value, read.instrument, strict=True)
@@ -312,8 +313,6 @@ def _bases(plan):
 
 def _tangents(plan):
     tangents, feet = plan.job.tangents, _feet(plan)
-    if tangents is None:
-        return []
     columns = (
         *(tangents.setup, tangents.course, tangents.level_m, tangents.is_right),
         *(tangents.zenith_rad, tangents.sd_rad),
@@ -335,8 +334,7 @@ def _tangents(plan):
 def _ties(plan):
     """Return a row for each target that neighbouring set-ups share."""
     setups_of = {}
-    measurements = None if plan.job.tangents is not None else plan.job.measurements
-    for readings in () if measurements is None else measurements.readings:
+    for readings in plan.job.network.readings:
         for setup, target in zip(readings.setup or (), readings.end, strict=True):
             setups_of.setdefault(target, {}).setdefault(setup)
     return [{"point": name, "setup": ", ".join(setups)} for name, setups in setups_of.items()]
