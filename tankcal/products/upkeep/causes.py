@@ -178,6 +178,8 @@ class Operation:
         {"meters" or "deliveries": whether volumes are at the base temperature already}.
     start_ns : int
         Time from which drifts count: the first mark of all logs.
+    offsets_ns : tuple of int
+        Times from which the gauge has a new offset.
     """
 
     stock: object
@@ -186,13 +188,14 @@ class Operation:
     air: tuple | None = None
     is_net: dict = field(default_factory=dict)
     start_ns: int | None = None
+    offsets_ns: tuple = ()
 
     def fingerprint(self):
         """Content that the estimates depend on: table, meters, priors and air."""
         table = self.stock.table
         return [table.digest, self.stock.names, self.stock.expansion_per_k, self.stock.base_c,
                 sorted(self.meters.items()), sorted(self.priors.items()),
-                sorted(self.is_net.items()), self.start_ns,
+                sorted(self.is_net.items()), self.start_ns, self.offsets_ns,
                 self.air and [hash_arrays(values) for values in self.air]]  # fmt: skip
 
     def linearize(self, steps, estimate=None, smoothed=None):
@@ -217,23 +220,25 @@ class Operation:
         warm = fill_gaps(marks.time_ns, marks.temperature_c, self.stock.base_c)
         # At adjusted levels, as all columns: readings share their errors with the misclosures.
         own_error = smoothed[:, 0] + smoothed[:, 1]
-        level_causes = self._level_causes(marks.level_m - own_error)
+        level_causes = self._level_causes(marks.level_m - own_error, marks.time_ns)
         shapes = len(self.stock.names)
         x = np.zeros(shapes + level_causes[0].shape[1]) if estimate is None else estimate
         moved = level_causes[0] @ x[shapes : shapes + level_causes[0].shape[1]]
         error = moved + own_error
-        level, form, warmer = marks.level_m - error, x[:shapes], warm + smoothed[:, 2]
+        level, form = marks.level_m - error, x[:shapes]
         low, high = self.stock.table.height_m[[0, -1]]
         level = np.clip(level, low + LEVEL_STEP_M, high - LEVEL_STEP_M)
-        stock = self.stock.stock_m3(level, warmer, form)
-        area = (
-            self.stock.stock_m3(level + LEVEL_STEP_M, warmer, form)
-            - self.stock.stock_m3(level - LEVEL_STEP_M, warmer, form)
-        ) / (2 * LEVEL_STEP_M)
-        by_degree = self.stock.stock_m3(level, warmer + 0.5, form) - self.stock.stock_m3(
-            level, warmer - 0.5, form
+        # A layer raises the level of an equal stock, so that columns at this level share its error.
+        # The level of this stock at the indicated temperature does not.
+        stock, area = self.stock.stock_m3(level, warm, form), self._slope(level, warm, form)
+        if smoothed[:, 2].any():
+            of_layer = self.stock.stock_m3(level, warm + smoothed[:, 2], form) - stock
+            level = np.clip(level + of_layer / area, low + LEVEL_STEP_M, high - LEVEL_STEP_M)
+            stock, area = self.stock.stock_m3(level, warm, form), self._slope(level, warm, form)
+        by_degree = self.stock.stock_m3(level, warm + 0.5, form) - self.stock.stock_m3(
+            level, warm - 0.5, form
         )
-        by_form = self.stock.columns(level, form) * self.stock.correction(warmer)[:, None]
+        by_form = self.stock.columns(level, form) * self.stock.correction(warm)[:, None]
         groups = [
             (self.stock.kind, self.stock.names, "1", np.ones(shapes), np.zeros(shapes),
              np.diff(by_form, axis=0)),
@@ -243,8 +248,8 @@ class Operation:
             ("temperature", ("temperature_sensor",), "K", [prior["temperature_k"]], [0.0],
              prior["temperature_k"] * np.diff(by_degree)[:, None]),
         ]  # fmt: skip
-        metered, flow_groups, noise = self._flows(steps, warmer, years)
-        delivered = self._deliveries(steps, warmer)
+        metered, flow_groups, noise = self._flows(steps, warm, years)
+        delivered = self._deliveries(steps, warm)
         groups += flow_groups
         seconds, known = steps.seconds, 0.0
         for name, kind, unit, mean, sd, column in (
@@ -308,6 +313,12 @@ class Operation:
         start = marks.time_ns[0] if self.start_ns is None else self.start_ns
         return (marks.time_ns - start) * 1e-9 / YEAR_S
 
+    def _slope(self, level, temperature_c, form):
+        """Change of the stock per metre of level, shape (m,)."""
+        high, low = (self.stock.stock_m3(level + step, temperature_c, form)
+                     for step in (LEVEL_STEP_M, -LEVEL_STEP_M))  # fmt: skip
+        return (high - low) / (2 * LEVEL_STEP_M)
+
     def _meter(self, name):
         """`Meter` with the priors in place of blanks."""
         meter, prior = self.meters.get(name, Meter(name)), self.priors
@@ -318,8 +329,8 @@ class Operation:
         known = {key: getattr(meter, key) for key in values if getattr(meter, key) is not None}
         return Meter(name, meter.factor, **(values | known))
 
-    def _level_causes(self, level_m):
-        """(columns (m, c) in m, names, units, sd) of the gauge: zero, scale, waves of the level."""
+    def _level_causes(self, level_m, time_ns):
+        """(columns (m, c) in m, names, units, sd) of the gauge: zeros, scale, waves of the level."""
         prior, high = self.priors, self.stock.table.height_m[-1]
         columns = [np.full(len(level_m), prior["gauge_zero_mm"] / 1000),
                    prior["gauge_scale_ppm"] * 1e-6 * level_m]  # fmt: skip
@@ -327,6 +338,10 @@ class Operation:
             ["gauge_zero", "gauge_scale"],
             [prior["gauge_zero_mm"], prior["gauge_scale_ppm"]],
         )
+        for moment in self.offsets_ns:
+            columns.append(prior["gauge_zero_mm"] / 1000 * (time_ns >= moment))
+            names.append(f"gauge_offset {np.datetime64(moment, 'ns').astype('datetime64[D]')}")
+            sd.append(prior["gauge_zero_mm"])
         for wave in range(1, BENDS + 1):
             angle = 2 * np.pi * wave * level_m / (1.1 * high)
             for name, shape in (("sin", np.sin(angle)), ("cos", np.cos(angle))):

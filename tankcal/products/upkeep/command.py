@@ -78,7 +78,7 @@ def _upkeep(options):
 
         print_paths(options.folder, write_starter(options.folder, language_of_run()))
         return
-    from tankcal.products.upkeep.paper import DOCUMENT
+    from tankcal.products.upkeep.paper import DOCUMENT, UpkeepPaper
     from tankcal.products.upkeep.reading import read_upkeep
     from tankcal.products.upkeep.state import State
     from tankcal.products.upkeep.upkeep import keep_up
@@ -99,7 +99,8 @@ def _upkeep(options):
     if options.record is not None:
         from tankcal.products.upkeep.new_record import make_record, write_record
 
-        record = make_record(inputs, result, state)
+        paper = UpkeepPaper(upkeep, language_of_run())
+        record = make_record(inputs, result, state, " ".join(paper.reasons()))
         write_record(record, options.record, language_of_run())
     if options.out is not None:
         written = DOCUMENT.write(

@@ -1,6 +1,6 @@
 """Metered flow: running totals and transactions of meters as volumes between any two times."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -61,7 +61,7 @@ def read_flows(files, adjusted=()):
     ----------
     files : sequence of logs.LogFile
     adjusted : sequence of (str, int)
-        Meter and time of a replacement, at which a total may fall.
+        Meter (None: all) and time of an adjustment or a replacement, at which a total may fall.
 
     Returns
     -------
@@ -80,7 +80,30 @@ def read_flows(files, adjusted=()):
                 parts.setdefault(name, []).append(
                     {key: values[rows] for key, values in chunk.items()} | {"file": file}
                 )
-    return [_join(name, parts[name], adjusted) for name in sorted(parts)]
+    flows = []
+    for name in sorted(parts):
+        moments = sorted(moment for meter, moment in adjusted if meter in (None, name))
+        flows += _divide(_join(name, parts[name], adjusted), moments)
+    return flows
+
+
+def _divide(flow, moments):
+    """Divide a `MeterFlow` at adjustments: the meter has a new factor, drift and name then."""
+    if not moments:
+        return [flow]
+    *earlier, moment = moments
+    place = int(np.searchsorted(flow.time_ns, moment, side="right"))
+    if not 0 < place < len(flow.time_ns):
+        return _divide(flow, earlier)
+    day = np.datetime64(moment, "ns").astype("datetime64[D]")
+    before = replace(flow, time_ns=flow.time_ns[:place], begin_ns=flow.begin_ns[:place],
+                     total_m3=flow.total_m3[: place + 1], heat=flow.heat[: place + 1])  # fmt: skip
+    later = MeterFlow(
+        f"{flow.name} {day}", flow.time_ns[place:], flow.begin_ns[place:],
+        flow.total_m3[place:] - flow.total_m3[place], flow.heat[place:] - flow.heat[place],
+        np.zeros((0, 2), dtype=np.int64),
+    )  # fmt: skip
+    return [*_divide(before, earlier), later]
 
 
 def _count_late(file, times, last):
@@ -139,7 +162,7 @@ def _sum_totals(name, rows, file, adjusted):
     volume = np.where(is_rollover, volume + size * unit, volume)
     is_reset = volume < 0
     for meter, moment in adjusted:
-        if meter == name and len(time) > 1:
+        if meter in (None, name) and len(time) > 1:
             place = np.clip(np.searchsorted(time, moment) - 1, 0, len(time) - 2)
             is_reset[place] = True
     file.findings.add("meters", "rollover", time[1:][is_rollover])

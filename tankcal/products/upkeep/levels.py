@@ -11,6 +11,9 @@ from tankcal.products.upkeep.state import NO_STATE
 PIECE_NS = 3600 * 10**9  # longest piece of a quiet window
 STUCK_STEPS = 8  # movement of the level, in quanta, that a stuck float has missed
 LINE_ROWS, LINE_M = 6, 1e-9  # a straight line through so many rows is an interpolation
+REST_NS = 2 * 3600 * 10**9  # shortest rest that is tested for a sloping line
+REST_ROWS, REST_RISE = (12, 24), 10  # rows of this test; rise of a line, in steps of the file
+SAME_SLOPE = 0.2  # relative scatter of slopes, below which the lines are a leak
 CLOCK_ROWS, CLOCK_STEP_NS = 1500, 240 * 10**9  # rows that compare the clocks, and their distance
 CLOCK_NS = 7 * 86400 * 10**9  # between two comparisons
 MOST_OFFSET_S = 60.0  # between two clocks; a larger offset causes a warning
@@ -91,6 +94,8 @@ class FileSums:
     stuck_ns : ndarray of int64, shape (s, 2)
     offsets : ndarray, shape (o, 2)
         Times, and offsets of the clock in seconds.
+    slopes : ndarray, shape (r,)
+        Slope of the levels in each long rest, m/s; nan: no straight line.
     names : tuple of str
         Kinds of findings.
     counts : ndarray of int64, shape (f, 3)
@@ -102,6 +107,7 @@ class FileSums:
     sums: np.ndarray
     stuck_ns: np.ndarray
     offsets: np.ndarray
+    slopes: np.ndarray
     names: tuple
     counts: np.ndarray
 
@@ -123,6 +129,8 @@ class LevelSums:
     ----------
     offsets : list of (int, float)
         Time and offset in seconds of the clock of the levels from the clock of the meters.
+    slopes : list of float
+        Slopes of the levels in long rests, m/s; nan: no straight line.
     """
 
     def __init__(self, windows, quantum_m, flows, volume_m3):
@@ -130,7 +138,8 @@ class LevelSums:
         self.quantum_m, self.flows, self.volume_m3 = quantum_m, flows, volume_m3
         count = len(self.pieces)
         self._total = np.full(count, np.nan), np.zeros((len(SUMS), count))
-        self.offsets, self._all_stuck = [], []
+        self.offsets, self.slopes, self._all_stuck = [], [], []
+        self._rests = windows[np.diff(windows, axis=1)[:, 0] >= REST_NS]
 
     def read(self, files, state=NO_STATE):
         """Add the rows of level logs, in order of their first time.
@@ -186,6 +195,7 @@ class LevelSums:
         total += np.stack(list(part.values()))
         self._all_stuck += [tuple(map(int, pair)) for pair in sums.stuck_ns]
         self.offsets += [(int(time), offset) for time, offset in sums.offsets]
+        self.slopes += sums.slopes.tolist()
         for name, (count, low, high) in zip(sums.names, sums.counts.tolist(), strict=True):
             findings.add("levels", name, (low, high), count)
 
@@ -194,7 +204,7 @@ class LevelSums:
         count, file = len(self.pieces), replace(file, findings=Findings())
         self._reference = np.full(count, np.nan)
         self._sums = {name: np.zeros(count) for name in SUMS}
-        self._stuck, self._clocks = [], []
+        self._stuck, self._clocks, self._lines = [], [], []
         recent = [np.zeros(0, dtype=np.int64), np.zeros(0)]
         run, first, last = None, None, NOT_A_TIME
         for chunk in file.chunks():
@@ -217,6 +227,7 @@ class LevelSums:
                           strict=True)]  # fmt: skip
             run = self._follow_runs(time[is_level], level[is_level], run)
             self._compare_clocks(time[is_level], level[is_level], file)
+            self._test_rests(time[is_level], level[is_level], file.profile.to_si("level", 1.0))
             is_line = np.zeros(len(time), dtype=bool)
             is_line[is_level] = find_lines(time[is_level], level[is_level])
             file.findings.add("levels", "interpolated", time[is_line])
@@ -228,7 +239,8 @@ class LevelSums:
             low, self._reference[low:high],
             np.stack([self._sums[name][low:high] for name in SUMS]),
             np.array(self._stuck, dtype=np.int64).reshape(-1, 2),
-            np.array(self._clocks, dtype=float).reshape(-1, 2), tuple(counts),
+            np.array(self._clocks, dtype=float).reshape(-1, 2), np.array(self._lines),
+            tuple(counts),
             np.array([[number, NOT_A_TIME if begin is None else begin,
                        NOT_A_TIME if end is None else end]
                       for number, begin, end in counts.values()], dtype=np.int64).reshape(-1, 3),
@@ -301,6 +313,31 @@ class LevelSums:
                 self._clocks.append((float(now[0]), offset))
                 if abs(offset) > most:
                     file.findings.add("levels", "clock_offset", now[[0, -1]], len(now))
+
+    def _test_rests(self, time, level, unit_m):
+        """Add the slopes of the levels in long rests, where a historian interpolates and rounds."""
+        if not len(time):
+            return
+        values = level[:1000] / unit_m
+        step = next((step for step in 10.0 ** -np.arange(5)
+                     if np.allclose(values / step, np.round(values / step), rtol=0, atol=1e-3)),
+                    1e-6) * unit_m  # fmt: skip
+        ends = np.searchsorted(time, self._rests)
+        for first, last in ends[np.diff(ends, axis=1)[:, 0] >= REST_ROWS[0]]:
+            rows = np.linspace(first, last - 1, min(last - first, REST_ROWS[1])).astype(int)
+            seconds, rise = (time[rows] - time[first]) * 1e-9, level[rows] - level[first]
+            slope = rise[-1] / seconds[-1]
+            # Rounding moves a reading and the ends of the line by half a step each.
+            is_line = np.max(np.abs(rise - slope * seconds)) < 1.01 * step
+            is_line &= abs(rise[-1]) > REST_RISE * step
+            self._lines.append(slope if is_line else np.nan)
+
+    def interpolated_share(self):
+        """Share of the long rests with levels on sloping lines, which are no leak."""
+        slopes = np.array(self.slopes)[np.isfinite(self.slopes)]
+        if not len(slopes) or np.std(slopes) < SAME_SLOPE * abs(np.mean(slopes)):
+            return 0.0
+        return len(slopes) / len(self.slopes)
 
     def _add(self, chunk, is_used):
         """Add readings to the sums of their pieces."""

@@ -34,7 +34,7 @@ from tankcal.uncertainty import Source
 KIND = "upkeep"  # of the only source of uncertainty of the new table
 
 
-def make_record(inputs, upkeep, state=NO_STATE):
+def make_record(inputs, upkeep, state=NO_STATE, reasons=None):
     """Return the record of the new table of an upkeep.
 
     Parameters
@@ -44,6 +44,8 @@ def make_record(inputs, upkeep, state=NO_STATE):
         Result of `keep_up` of these inputs.
     state : state.State, optional
         Results of earlier runs.
+    reasons : str, optional
+        Why the table is not improved, in the language of the user; None: codes.
 
     Returns
     -------
@@ -58,7 +60,7 @@ def make_record(inputs, upkeep, state=NO_STATE):
     if upkeep.mode != "improved":
         text = message("upkeep_not_improved", "the table is not improved ({reasons}); expected "
                        "an improved table for a new record",
-                       reasons=", ".join(upkeep.reasons))  # fmt: skip
+                       reasons=reasons or ", ".join(upkeep.reasons))  # fmt: skip
         raise InputError(Problem(SETTINGS, text))
     former = records.load(inputs.record_path)
     table, period, scale = inputs.table, upkeep.period, upkeep.fit.scale

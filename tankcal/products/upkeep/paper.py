@@ -253,9 +253,12 @@ class UpkeepPaper(SavedPaper):
         )  # fmt: skip
 
     def reasons(self):
-        """Reasons why results are not stated, and the number of solutions."""
-        count = len(self.record["start"]["solutions"])
-        texts = [self.words["reasons"][reason] for reason in self.record["reasons"]]
+        """Sentences on undetermined or unstated results, and on the number of solutions."""
+        solutions = self.record["start"]["solutions"]
+        count, r = len(solutions), ""
+        if count:  # of tilt and zero, the last two sizes
+            r = self.number(solutions[0]["correlation"][-1][-2], decimals=2)
+        texts = [self.word(f"reasons.{reason}", r=r) for reason in self.record["reasons"]]
         return texts + ([self.word("texts.solutions", count=count)] if count > 1 else [])
 
     def alarm(self):
@@ -276,6 +279,10 @@ class UpkeepPaper(SavedPaper):
                 for row in possible))  # fmt: skip
             code = "alarm_named" if watch["is_named"] else "alarm_open"
             text = self.word(f"texts.{code}", day=self.day(watch["alarm"]), names=names, **numbers)
+            declared = {"meter": "declare_meter", "zero": "declare_zero"}
+            hints = [self.word(f"texts.{hint}") for kind, hint in declared.items()
+                     if any(row["kind"] == kind for row in possible)]  # fmt: skip
+            text = " ".join([text, *hints])
         if watch["is_provisional"]:
             text = f"{text} {self.word('texts.provisional')}"
         return text
@@ -405,7 +412,9 @@ def _sheets(book):
     facts = [(paper.label(key), value, None) for key, value in _facts(paper) if value]
     parts = [
         Facts(facts),
-        Sentences([paper.result(), *paper.reasons(), paper.alarm()]),
+        Sentences(
+            [paper.result(), *paper.reasons(), paper.alarm(), paper.word("texts.throughput")]
+        ),
         Sentences(_remarks(paper), title=paper.words["headings"]["remarks"]),
     ]
     yield SheetContent("upkeep_result", parts, landscape=False, widths=(42, 58))

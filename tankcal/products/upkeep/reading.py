@@ -30,7 +30,7 @@ from tankcal.products.upkeep.causes import PRIORS, Meter, Operation, TableStock
 from tankcal.products.upkeep.flows import quiet_windows, read_flows
 from tankcal.products.upkeep.levels import MOST_OFFSET_S, LevelSums
 from tankcal.products.upkeep.logs import Findings, LogFile
-from tankcal.products.upkeep.own_table import compare_own_volumes
+from tankcal.products.upkeep.own_table import compare_own_volumes, find_water
 from tankcal.products.upkeep.profiles import read_log_profile
 from tankcal.products.upkeep.start import (
     DRAWING,
@@ -49,7 +49,7 @@ from tankcal.text.words import load_words
 FIXED = ("settings", "record")  # kinds of files that are no logs
 SETTINGS, METERS = "upkeep.toml", "meters.csv"
 LOGS = ("levels", "meters", "deliveries", "events", "air")
-ASKED = {("upkeep", "record"), ("levels", "files"), ("meters", "files")}
+ASKED = {("upkeep", "record"), ("upkeep", "timezone"), ("levels", "files"), ("meters", "files")}
 EVENTS = (
     "proving", "adjusted", "gauge_set", "dip", "water_drawn", "product_changed", "opened",
     "repaired", "clock_set", "table_changed",
@@ -58,6 +58,7 @@ BROKEN_BY = {  # events that no step may contain
     "gauge_set": "adjusted", "water_drawn": "water_drawn", "product_changed": "adjusted",
     "opened": "adjusted", "repaired": "adjusted", "table_changed": "adjusted",
 }  # fmt: skip
+NEW_OFFSET = ("gauge_set", "product_changed")  # events after which the gauge has another offset
 SERVICES = {  # settle_s, rest_h, least_delivery_m3, noise_mm if upkeep.toml declares none
     "station": {"settle_s": 120.0, "rest_h": 2.0, "least_delivery_m3": 0.3, "noise_mm": 0.3},
     "terminal": {"settle_s": 1800.0, "rest_h": 12.0, "least_delivery_m3": 10.0, "noise_mm": 1.0},
@@ -79,7 +80,7 @@ def _files(kind):
 SECTIONS = {
     "upkeep": (
         Field("record", "text", "record.json of the tank, a table or a job"),
-        Field("timezone", "text", "IANA name of local times", required=True),
+        Field("timezone", "text", "IANA name of local times"),
         choice("service", "", tuple(SERVICES), required=True),
         choice("language", "", LANGUAGES),
         number("coverage_probability", "", 0.5, 0.9999),
@@ -251,6 +252,9 @@ def read_upkeep(folder, state=NO_STATE, source=None):
 
     zone = sections["upkeep"]["timezone"]
     try:
+        if zone is None:
+            tell("upkeep.timezone", message("upkeep_no_zone", "missing; expected the IANA time "
+                 "zone of local times, such as America/Sao_Paulo, or UTC"))  # fmt: skip
         ZoneInfo(zone or "UTC")
     except (ZoneInfoNotFoundError, ValueError):
         tell("upkeep.timezone", message("upkeep_zone", "no time zone {name}; expected an IANA name "
@@ -407,6 +411,7 @@ def _build(sections, stock, meters, files, findings, sources, log, state):
     inside = ~table.is_outside(pieces.level_m)
     findings.add("levels", "outside_table", pieces.time_ns[~inside], pieces.count[~inside].sum())
     pieces = pieces.select(inside)
+    find_water(pieces, table, events, files["levels"][0].path.name, log)
     rules = StepRules(quantum, rules["noise_mm"] / 1000, rules["rest_h"],
                       rules["least_delivery_m3"], float(np.ptp(table.height_m)))  # fmt: skip
     broken = [(event["time"], REASONS.index(BROKEN_BY[event["kind"]]))
@@ -424,12 +429,12 @@ def _build(sections, stock, meters, files, findings, sources, log, state):
                        most=MOST_OFFSET_S)  # fmt: skip
         log.warning(files["levels"][0].path.name, text, column="time")
         clock = int(findings.counts["levels", "clock_offset"][1]), float(offset)
-    _judge_cleaning(findings, files["levels"][0].path.name, log)
+    _judge_cleaning(findings, sums.interpolated_share(), files["levels"][0].path.name, log)
     log.stop_if_problems()
     operation = Operation(
         stock, {name: meter for name, (meter, _) in meters.items()}, priors, air,
         {kind: bool(sections[kind]["net"]) for kind in ("meters", "deliveries")},
-        int(steps.marks.time_ns[0]),
+        int(steps.marks.time_ns[0]), _find_offsets(events, files["events"], log),
     )  # fmt: skip
     traceable = {name: number for name, (_, number) in meters.items() if number}
     for flow in flows:
@@ -445,8 +450,14 @@ def _build(sections, stock, meters, files, findings, sources, log, state):
                   tuple(log.warnings), clock=clock)  # fmt: skip
 
 
-def _judge_cleaning(findings, file, log):
-    """Warn of, or refuse, a level log of which too many rows are unused."""
+def _judge_cleaning(findings, interpolated, file, log):
+    """Warn of, or refuse, a level log of which too many rows are unused or interpolated."""
+    if interpolated > UNUSED_WARNED:
+        text = message("upkeep_interpolated", "in {share:.0f} % of the long rests the levels are "
+                       "on sloping lines of a historian that interpolates; expected readings "
+                       "without compression, at most {most:.0f} %", share=100 * interpolated,
+                       most=100 * UNUSED_REFUSED)  # fmt: skip
+        (log.problem if interpolated > UNUSED_REFUSED else log.warning)(file, text)
     rows = findings.number("levels", "row")
     unused = sum(findings.number("levels", kind)
                  for kind in ("stuck", "interpolated", "bad_quality", "not_a_number",
@@ -476,6 +487,19 @@ def _read_events(files, log):
                      "meter": meter if isinstance(meter, str) else None}
                 )  # fmt: skip
     return sorted(events, key=lambda event: event["time"])
+
+
+def _find_offsets(events, files, log):
+    """Times from which the gauge has a new offset: it was set, or its float is in other liquid."""
+    times = [event["time"] for event in events if event["kind"] in NEW_OFFSET]
+    for event in events:
+        if event["kind"] == "product_changed":
+            text = message("upkeep_product_changed", "the product changed on {day}: another "
+                           "density moves the float, so the gauge has a new offset; the expansion "
+                           "is that of [liquid] throughout. Expected an upkeep for each product",
+                           day=str(np.datetime64(event["time"], "ns"))[:10])  # fmt: skip
+            log.warning(files[0].path.name, text)
+    return tuple(sorted(set(times)))
 
 
 def _read_tickets(files, findings):

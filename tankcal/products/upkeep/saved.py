@@ -14,7 +14,7 @@ UPKEEP = SavedFormat(
 MODES = ("improved", "deliveries", "watched")
 STARTS = ("record", "table", "job", "drawing", "sales")
 STEP_KINDS = ("rest", "sales", "delivery")
-VERDICTS = ("pass", "fail", "inconclusive")
+VERDICTS = ("pass", "fail", "inconclusive", "gain")
 
 
 class UpkeepPeriod(Saved):
@@ -210,7 +210,9 @@ class UpkeepFile(Saved, kw_only=True):
     liquid: str | None = key("name of the liquid")
     start: UpkeepStart = key("table with which the upkeep began")
     mode: str = key(", ".join(MODES))
-    reasons: list[str] = key("why the table is not improved, or its contents are not stated")
+    reasons: list[str] = key(
+        "why a result is not stated, or quantities that the steps do not determine"
+    )
     period: UpkeepPeriod = key("time and steps")
     fit: UpkeepFit = key("agreement with the model")
     rows: list[UpkeepRow] = key("former and new table; empty: only deliveries are stated")

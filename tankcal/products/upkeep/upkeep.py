@@ -32,6 +32,7 @@ GLOBAL_TEST = 1e-3  # least probability of chi-square for an improved table
 SIR_LIMIT_L_H = 0.757  # 0.2 gal/h, the rate of inventory reconciliation (40 CFR 280.43)
 ONE_SIDED = 1.645  # standard deviations of the 95 % quantile of the usual loss
 WIDE_CHANGE = 1e3  # prior standard deviation of the change of a month, L/h or %
+UNKNOWN = 0.9  # u after over u before, above which a cause is not determined
 ROWS_SHOWN = 4  # deliveries between fifths of the seen levels
 _OF_STOCK = {"no_traceable_meter": "stock_meter"}  # reasons without a calibration
 VARIANCE_RATIO = 2.0  # of observed and declared variances, beyond which a warning is given
@@ -85,6 +86,7 @@ def keep_up(inputs, state=NO_STATE, *, with_steps=False):
         reasons.append("stock_contents")
     if watched.alarm_s is not None:
         reasons.append("alarm")
+    reasons += _find_unknown(estimation, is_free)
     mode = "improved"
     if {"few_steps", "small_range", "global_test", "outliers", "alarm"} & set(reasons):
         mode = "watched"
@@ -234,6 +236,14 @@ def _refusals(estimation, table, low, high, former_u, seen, traceable):
     return reasons
 
 
+def _find_unknown(estimation, is_free):
+    """Codes of undetermined quantities: the zero of the gauge; the tilt beside the zero."""
+    causes, (_, u) = estimation.balance.causes, estimation.sizes()
+    zero = [i for i, name in enumerate(causes.names) if name == "gauge_zero"]
+    codes = ["zero"] if zero and u[zero[0]] > UNKNOWN * causes.sd[zero[0]] else []
+    return codes + (["tilt"] if is_free else [])
+
+
 def _error_ratio(change, former_U, U):
     """E_n of a table that contains the former table: change / sqrt(U_old^2 - U_new^2)."""
     difference = former_U**2 - U**2
@@ -363,6 +373,8 @@ def _months(estimation, start_ns, k, scale):
         verdict = "inconclusive"
         if detectable <= SIR_LIMIT_L_H:
             verdict = "fail" if sizes[i] > usual + detectable / 2 else "pass"
+        if sizes[i] < -detectable / 2:
+            verdict = "gain"
         result.append(
             saved.UpkeepMonth(
                 str(month), int(np.sum(estimation.is_used & (number == i))), float(sizes[i]),

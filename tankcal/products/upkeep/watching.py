@@ -249,6 +249,9 @@ def _watch_window(estimation, begin, first, last, rate):
     names, is_named = (), False
     if alarm_s is not None:
         suspects = _refine_beginnings(suspects, trials, w[-1], seconds[begin:], find_effects)
+    suspects = tuple(replace(cause, kind="gain") if cause.kind == "leak" and cause.size < 0 else
+                     cause for cause in suspects)  # fmt: skip
+    if alarm_s is not None:
         best = suspects[0].w ** 2
         names = tuple(cause for cause in suspects if best - cause.w**2 < ALIKE)
         is_named = len(names) == 1 and seconds[-1] - alarm_s >= NAMED_AFTER_DAYS * DAY_S
