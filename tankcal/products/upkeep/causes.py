@@ -330,7 +330,7 @@ class Operation:
         return Meter(name, meter.factor, **(values | known))
 
     def _level_causes(self, level_m, time_ns):
-        """(columns (m, c) in m, names, units, sd) of the gauge: zeros, scale, waves of the level."""
+        """(columns (m, c) in m, names, units, sd) of the gauge: zeros, scale, waves of levels."""
         prior, high = self.priors, self.stock.table.height_m[-1]
         columns = [np.full(len(level_m), prior["gauge_zero_mm"] / 1000),
                    prior["gauge_scale_ppm"] * 1e-6 * level_m]  # fmt: skip
