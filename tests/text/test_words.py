@@ -1,12 +1,15 @@
 """The words: every code that a record may hold has its sentence."""
 
+import marshal
 import re
+import sys
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
 
 from tankcal.errors import TankcalError
-from tankcal.text.words import load_words, sentence
+from tankcal.text.words import _parse_once, load_words, sentence
 
 FORMAT = (Path(__file__).parents[2] / "docs" / "record-format.md").read_text(encoding="utf-8")
 ANY_VALUE = 2.5
@@ -98,6 +101,28 @@ def test_words_are_the_callers_own():
     words = load_words("en")
     words["choices"].clear()
     assert load_words("en")["choices"]
-    assert load_words("en", ["choices", "page"]) == {
-        name: load_words("en")[name] for name in ("choices", "page")
-    }
+
+
+def test_stored_words_are_those_of_their_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    monkeypatch.setattr(sys, "pycache_prefix", None)
+    file, folder = tmp_path / "xx.toml", tmp_path / "__pycache__"
+
+    def parsed():
+        return marshal.loads(_parse_once.__wrapped__(file))
+
+    file.write_text("[page]\nnumber = 'No.'\n", encoding="utf-8")
+    assert parsed() == {"page": {"number": "No."}}
+    (stored,) = folder.iterdir()
+    other = marshal.dumps({"page": {"number": "stored"}})
+    stored.write_bytes(sha256(file.read_bytes() + other).digest() + other)
+    assert parsed() == {"page": {"number": "stored"}}  # not parsed again
+    for damaged in (b"", stored.read_bytes()[:-1], bytes(32) + other):
+        stored.write_bytes(damaged)
+        assert parsed() == {"page": {"number": "No."}}
+    file.write_text("[page]\nnumber = 'N'\n", encoding="utf-8")
+    assert parsed() == {"page": {"number": "N"}}
+    stored.unlink()
+    folder.rmdir()
+    folder.write_text("no folder")  # as in an installation without the right to write
+    assert parsed() == {"page": {"number": "N"}}

@@ -42,11 +42,6 @@ from tankcal.text.words import language_of, load_words
 
 __all__ = ["DCC", "FILE", "certificate_xml", "language_with"]
 FILE = "certificate.xml"
-_GROUPS = (  # groups of words for a record without survey, warning or decision
-    *("language", "dcc", "certificate", "titles", "headings", "labels", "captions", "texts"),
-    *("choices", "inputs", "kinds", "sides", "zeros", "parts", "units", "yes_no"),
-    *("rule_codes", "rule_texts", "formulas", "datum", "tank_limits", "table_headings"),
-)
 _UNITS = {  # {printed unit: unit of the value}; values are in SI, angles in degrees
     "m": METRE,
     "mm": METRE,
@@ -81,9 +76,7 @@ def certificate_xml(record, digest, language=None):
     """
     first = language or language_of(record)
     codes = [first, *(code for code in LANGUAGES if code != first)]
-    needs_all = record["warnings"] or record["adjustment"] or record.get("overrulings")
-    groups = None if needs_all else _GROUPS
-    languages = Translations(record, [load_words(code, groups) for code in codes])
+    languages = Translations(record, [load_words(code) for code in codes])
     root = make_root(CERTIFICATE)
     add_administrative_data(add_child(root, "administrativeData"), languages, digest)
     add_results(add_child(root, "measurementResults"), languages, digest)
