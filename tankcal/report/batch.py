@@ -14,7 +14,9 @@ from tankcal.report.saved_document import bearable, signed_text
 from tankcal.report.tables import Column, Table
 from tankcal.text.words import load_words, say
 
-FILES = JSON, CSV, WORKBOOK, PAGE = "summary.json", "summary.csv", "summary.xlsx", "summary.html"
+JSON, CSV, WORKBOOK, PAGE = "summary.json", "summary.csv", "summary.xlsx", "summary.html"
+ALARMS = "alarms.csv"  # of tanks in service
+FILES = JSON, CSV, WORKBOOK, PAGE, ALARMS
 STATUSES = ("done", "unsound", "refused", "failed")  # of a job, from the best to the worst
 MOST_CHANGES = 3  # largest number of changes in a cell
 OF_RULE = {  # {verdict: group of the short words for its codes}
@@ -55,11 +57,18 @@ def summary_files(summary, language, folder):
     is_utf8 = data == text.encode("utf-8", "surrogatepass")
     paper = SummaryPaper(summary if is_utf8 else json.loads(data), language)
     del text, data
-    write_table(CSV_COLUMNS, folder / CSV, [paper.plain_row(row) for row in paper.summary["rows"]])
+    rows = [paper.plain_row(row) for row in paper.summary["rows"]]
+    write_table(CSV_COLUMNS, folder / CSV, rows)
+    if is_watched := "upkeep" in summary["do"]:
+        alarms = [row for row in rows if row.get("alarm")]
+        columns = {
+            column.key: [row[column.key] for row in alarms] for column in ALARM_COLUMNS.in_csv()
+        }
+        write_table(ALARM_COLUMNS, folder / ALARMS, columns)
     write_summary(paper, folder / WORKBOOK)
     web_page = page([block.data for block in page_blocks(paper)])
     (folder / PAGE).write_text(web_page, encoding="utf-8", errors="replace")
-    return [*FILES]
+    return [name for name in FILES if name != ALARMS or is_watched]
 
 
 class SummaryPaper(PlainPaper):
@@ -195,6 +204,14 @@ CSV_COLUMNS = Table(
         )
     ),
 )
+
+
+ALARM_COLUMNS = Table(
+    "alarms",
+    tuple(Column(key, csv=key) for key in (
+        "name", "tank", "date", "alarm", "alarm_verdict", "causes", "leak_l_h", "leak_U_l_h",
+        "false_alarms")),
+)  # fmt: skip
 
 
 def _without_empty_columns(rows):

@@ -130,7 +130,7 @@ def _kind_of_input(steps):
     """Return the input of the steps: "jobs", "records", "upkeeps", or "either", jobs preferred."""
     if "run" in steps:
         return "jobs"
-    if steps == ("upkeep",):
+    if "upkeep" in steps:
         return "upkeeps"
     return "either" if steps == ("inspect",) else "records"
 

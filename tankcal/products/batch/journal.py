@@ -184,11 +184,13 @@ def compute_keys(job, former=None):
             bears.pop("letterhead")
         if step == "compare":
             bears["former"] = None if former is None else digest_inputs(former)
-        if step == "upkeep":
+        if "upkeep" in options.steps:
             from tankcal.products.upkeep.reading import find_record
 
             record = find_record(job.source)
             bears["former"] = None if record is None else digest_inputs(record)
+            if "export" in options.steps:
+                bears["exports"] = True  # the upkeep then writes its table
         text = json.dumps(bears, sort_keys=True)
         keys[step] = sha256(text.encode()).hexdigest()
     return keys

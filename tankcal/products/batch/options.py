@@ -7,7 +7,7 @@ from os.path import exists
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 
-STEPS = ("run", "report", "compare", "inspect", "export", "upkeep")  # in their order
+STEPS = ("run", "report", "compare", "inspect", "upkeep", "export")  # in their order
 FOLDERS = {
     "run": "results",
     "report": "report",
@@ -88,9 +88,10 @@ def parse_steps(text):
             steps=[*STEPS],
         )
         raise InputError(Problem("--do", expected))
-    if "upkeep" in names and len(set(names)) > 1:
-        text = message("batch_upkeep_alone", "found {text!r}; expected upkeep alone: its input are "
-                       "folders with upkeep.toml", text=text[:60])  # fmt: skip
+    if "upkeep" in names and not {"upkeep", "export"}.issuperset(names):
+        text = message("batch_upkeep_alone", "found {text!r}; expected upkeep, alone or with "
+                       "export: its input are folders with upkeep.toml",
+                       text=text[:60])  # fmt: skip
         raise InputError(Problem("--do", text))
     return tuple(step for step in STEPS if step in names)
 

@@ -27,6 +27,7 @@ from tankcal.record.inspection import VERDICTS
 
 IN_THE_WAY = (errno.EEXIST, errno.EISDIR, errno.ENOTDIR)  # errors of a job, not of the batch
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
+NEW_TABLE = "table"  # folder of the table that an upkeep has improved, for export
 STATUS_OF_EXIT = {2: "refused", 3: "unsound"}
 
 
@@ -113,8 +114,8 @@ def _run_steps(outcome, task, clock):
             settled = _run_step(step, task, clock)
             outcome = replace(outcome, steps={**outcome.steps, step: settled})
             save_outcome(task.out, outcome)
-        if step == "run" and outcome.steps[step].status != "done":
-            break  # the other steps need the results of the run
+        if step in ("run", "upkeep") and outcome.steps[step].status != "done":
+            break  # the other steps need its results
     return outcome
 
 
@@ -265,8 +266,12 @@ def _upkeep(task, clock):
     with clock.step("read"):
         inputs = read_upkeep(task.job.source, state)
     with clock.step("compute"):
-        upkeep = to_plain(keep_up(inputs, state))
-    language = options.language or inputs.sections["upkeep"]["language"]
+        result = keep_up(inputs, state)
+    upkeep, language = to_plain(result), options.language or inputs.sections["upkeep"]["language"]
+    if "export" in options.steps and result.mode == "improved":
+        from tankcal.products.upkeep.new_record import make_record, write_record
+
+        write_record(make_record(inputs, result, state), place.with_name(NEW_TABLE), language)
     if options.papers:
         return DOCUMENT.write(upkeep, place, language, None, _letterhead(options))
     DOCUMENT.refuse_foreign(place)
@@ -288,8 +293,25 @@ def _place(task, step):
 
 def _record(task):
     """Return the input file of a step: the record of this batch, or of the job."""
-    record = _place(task, "run") / RECORD
-    return record if "run" in task.job.options.steps else Path(task.job.source)
+    steps = task.job.options.steps
+    if "upkeep" in steps:
+        return _table_in_force(task)
+    return _place(task, "run") / RECORD if "run" in steps else Path(task.job.source)
+
+
+def _table_in_force(task):
+    """Return the record of the improved table of an upkeep, or that of the former table."""
+    from tankcal.products.upkeep.reading import find_record
+
+    place = _place(task, "upkeep")
+    mode = json.loads((place / "upkeep.json").read_bytes())["mode"]
+    former = find_record(task.job.source)
+    record = place.with_name(NEW_TABLE) / RECORD if mode == "improved" else former
+    if record is None:
+        text = message("batch_no_table_in_force", "no table in force; expected record.json as "
+                       "record of upkeep.toml for export")  # fmt: skip
+        raise InputError(Problem("upkeep.toml", text))
+    return record
 
 
 def _language(task, record):
