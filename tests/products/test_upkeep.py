@@ -506,6 +506,12 @@ def test_example_of_an_upright_tank(tmp_path, capsys):
     capsys.readouterr()
 
 
+def exports_of(job):
+    """Rows of the exported table of a job of a batch."""
+    (file,) = (job / "export").glob("*.csv")
+    return file.read_text().splitlines()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("language", ["en", "es", "pt-BR"])
 def test_batch_lists_alarms(record, tmp_path, capsys, language):
@@ -527,8 +533,17 @@ def test_batch_lists_alarms(record, tmp_path, capsys, language):
     outcome = (out / "jobs" / "valid" / "upkeep" / "upkeep.json").stat().st_mtime_ns
     assert cli.main(batch) == 0  # nothing changed
     assert (out / "jobs" / "valid" / "upkeep" / "upkeep.json").stat().st_mtime_ns == outcome
-    assert cli.main([*batch[:3], "upkeep,export", *batch[4:]]) == 2
+    (alarm,) = (out / "alarms.csv").read_text().splitlines()[1:]
+    assert alarm.startswith("leaking,")
+    assert rows["leaking"]["alarm"] in alarm
+    assert cli.main([*batch[:3], "run,upkeep", *batch[4:]]) == 2
     assert "upkeep" in capsys.readouterr().err
+    # Neither table is improved, so that both exports are those of the former table.
+    assert cli.main([*batch[:3], "upkeep,export", "--profile", "csv", *batch[4:]]) == 0
+    exports = [exports_of(out / "jobs" / name) for name in ("valid", "leaking")]
+    assert exports[0] == exports[1]
+    assert len(exports[0]) > 50
+    assert not (out / "jobs" / "valid" / "table").exists()
 
 
 @pytest.fixture(scope="module")
@@ -571,6 +586,20 @@ def test_new_record_is_a_record(record, improved, tmp_path, capsys):
     between = np.diff(new.factor(ends), axis=0)[0]
     correlation = between @ meter["covariance_with_inputs"] / np.linalg.norm(between) / meter["u"]
     assert correlation == pytest.approx(stated["correlation"], abs=2e-3)
+
+
+@pytest.mark.slow
+def test_batch_exports_the_improved_table(improved, tmp_path, capsys):
+    """The exported table of a batch is that of `upkeep --record` and `export`."""
+    batch = ["batch", str(improved / "station"), "--do", "upkeep,export", "--profile", "csv"]
+    batch += ["--no-papers", "--out", str(tmp_path / "out"), "--workers", "0", "--quiet"]
+    assert cli.main(batch) == 0
+    single = tmp_path / "single" / "export" / "table.csv"
+    single.parent.mkdir(parents=True)
+    record = str(improved / "new" / "record.json")
+    assert cli.main(["export", record, "--profile", "csv", "--out", str(single)]) == 0
+    assert exports_of(tmp_path / "out" / "jobs" / "station") == exports_of(tmp_path / "single")
+    capsys.readouterr()
 
 
 @pytest.mark.slow
