@@ -16,6 +16,7 @@ from tankcal.terminal.showing import (
     print_paths,
     read_job,
     say,
+    skip_docs_of_matplotlib,
     warn,
 )
 from tankcal.text.digits import (
@@ -138,6 +139,8 @@ def _compute(
     if doubts and tell is _tell:  # before the computation, which they may slow down
         show.end()
         print_doubts(doubts)
+    if papers[1]:
+        skip_docs_of_matplotlib()
     result = None
     if only == "adjustment":
         adjustment = tankcal.adjust_job(job, show.step)

@@ -12,6 +12,7 @@ import shutil
 import sys
 import time
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 from tankcal.errors import InputError, problem_of
@@ -100,9 +101,32 @@ def read_job(source, show, **options):
     if language is not None:
         speak(language)
     show.step(message("reading_job", "reading {file}", file=str(source)))
+    _skip_docs_of_scipy()
     from tankcal.job import load  # takes half a second: print the line above first
 
     return load(source, **options)
+
+
+def _skip_docs_of_scipy():
+    """Let scipy load without the docstrings that it composes: a fifth of its loading time.
+
+    Only for a process that shows no docstrings. Without effect if scipy moves its private module.
+    """
+    with suppress(ImportError):
+        from scipy._lib import _docscrape
+
+        _docscrape.FunctionDoc = partial(_docscrape.FunctionDoc, doc="")
+
+
+def skip_docs_of_matplotlib():
+    """Let matplotlib load without the docstrings that it composes: a third of its loading time.
+
+    As for scipy: only for a process that shows no docstrings.
+    """
+    from matplotlib import artist
+
+    artist.kwdoc = lambda _: ""
+    artist.ArtistInspector.get_setters = lambda _: []
 
 
 def prepare_for_small_work():
