@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tankcal.messages import message
 from tankcal.products.upkeep.clocks import NOT_A_TIME, find_offset_s
 from tankcal.products.upkeep.logs import Findings
 from tankcal.products.upkeep.state import NO_STATE
@@ -17,6 +18,7 @@ SAME_SLOPE = 0.2  # relative scatter of slopes, below which the lines are a leak
 CLOCK_ROWS, CLOCK_STEP_NS = 1500, 240 * 10**9  # rows that compare the clocks, and their distance
 CLOCK_NS = 7 * 86400 * 10**9  # between two comparisons
 MOST_OFFSET_S = 60.0  # between two clocks; a larger offset causes a warning
+MOST_SHARED = 2  # pieces with levels of two files, as where a month ends
 OVERLAP = 400_000  # rows in which a late row is compared with earlier rows
 
 
@@ -139,6 +141,7 @@ class LevelSums:
         count = len(self.pieces)
         self._total = np.full(count, np.nan), np.zeros((len(SUMS), count))
         self.offsets, self.slopes, self._all_stuck = [], [], []
+        self._file_of = np.zeros(count, dtype=object)  # the first file with a level in each piece
         self._rests = windows[np.diff(windows, axis=1)[:, 0] >= REST_NS]
 
     def read(self, files, state=NO_STATE):
@@ -158,6 +161,7 @@ class LevelSums:
                 if span is not None and not file.log.problems:
                     state.save(key, span)
                     state.save(self._key(state, key, span), sums)
+            self._refuse_repeated(sums, file)
             self._add_file(sums, file.findings)
             if "row" in sums.names:  # as if the file had been read
                 file.span[:] = sums.counts[sums.names.index("row")].tolist()
@@ -182,6 +186,16 @@ class LevelSums:
         """First and last piece of an interval, with a margin."""
         first, last = np.searchsorted(self.pieces[:, 0], (low, high))
         return max(int(first) - 1, 0), min(int(last) + 1, len(self.pieces))
+
+    def _refuse_repeated(self, sums, file):
+        """Report a file with levels at the times of another, such as a copy in another encoding."""
+        has_level = np.flatnonzero(sums.sums[SUMS.index("n")] > 0) + sums.first
+        others = self._file_of[has_level]
+        if np.sum(others != 0) > MOST_SHARED:
+            file.log.problem(file.path.name, message(
+                "upkeep_levels_twice", "levels at the times of those of {twin}; expected each "
+                "reading once: it would count twice", twin=others[others != 0][0]))  # fmt: skip
+        self._file_of[has_level[others == 0]] = file.path.name
 
     def _add_file(self, sums, findings):
         """Add the sums of a file, about the reference of the first file with a reading."""

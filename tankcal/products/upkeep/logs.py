@@ -162,7 +162,16 @@ class LogFile:
         for chunk in frames:
             frame = chunk.rename(columns=used)
             # The heading again, such as in joined files, is no row.
-            frame = frame[frame["time"].str.strip() != columns["time"]]
+            is_heading = (frame["time"].str.strip() == columns["time"]).to_numpy()
+            for place in np.flatnonzero(is_heading):
+                cells = {column: str(frame[column].iloc[place]).strip() for column in frame}
+                if any(cell != columns[column] for column, cell in cells.items()):
+                    text = message("upkeep_other_heading", "the heading changes to {found}; "
+                                   "expected files with a single heading: divide the file",
+                                   found=", ".join(cells.values())[:200])  # fmt: skip
+                    self.log.problem(self.path.name, text, int(row + place))
+                    return
+            frame = frame[~is_heading]
             yield row, self._numbers(frame, layout.decimal)
             row += len(chunk)
 
@@ -252,8 +261,8 @@ class LogFile:
             rows += read(block[3].decode(), "".join(block[4].decode("latin-1").split()))
         if not blocks:
             text = message("upkeep_no_block", "no block of this format; expected a capture of the "
-                           "computer format {code}",
-                           code="i201" if is_inventory else "i202")  # fmt: skip
+                           "computer format {name}",
+                           name="i201" if is_inventory else "i202")  # fmt: skip
             self.log.problem(self.path.name, text)
         frame = pd.DataFrame(rows)
         if len(frame):

@@ -398,6 +398,7 @@ def _build(sections, stock, meters, files, findings, sources, log, state):
     if not flows or not any(len(flow.time_ns) for flow in flows):
         text = message("upkeep_no_flow", "no metered volume; expected sales or receipts")
         raise InputError(Problem(files["meters"][0].path.name, text))
+    _refuse_copies(files["meters"] + files["deliveries"], log)
     span = 400 * 86400 * 10**9
     first = min(flow.begin_ns.min() for flow in flows if len(flow.time_ns)) - span
     last = max(flow.time_ns.max() for flow in flows if len(flow.time_ns)) + span
@@ -448,6 +449,17 @@ def _build(sections, stock, meters, files, findings, sources, log, state):
                for source in sources]  # fmt: skip
     return Inputs(sections, operation, steps, findings, tuple(sources), len(pieces), traceable,
                   tuple(log.warnings), clock=clock)  # fmt: skip
+
+
+def _refuse_copies(files, log):
+    """Report files with the rows and times of another file, such as a copy with other line ends."""
+    known = {}
+    for file in files:
+        twin = known.setdefault((file.kind, *file.span), file)
+        if twin is not file and file.span[0]:
+            log.problem(file.path.name, message(
+                "upkeep_rows_twice", "as many rows as {twin}, with equal first and last time; "
+                "expected each log once: it would count twice", twin=twin.path.name))  # fmt: skip
 
 
 def _judge_cleaning(findings, interpolated, file, log):
