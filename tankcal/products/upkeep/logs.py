@@ -166,9 +166,9 @@ class LogFile:
             for place in np.flatnonzero(is_heading):
                 cells = {column: str(frame[column].iloc[place]).strip() for column in frame}
                 if any(cell != columns[column] for column, cell in cells.items()):
-                    text = message("upkeep_other_heading", "the heading changes to {found}; "
+                    text = message("upkeep_other_heading", "the heading changes to {headings}; "
                                    "expected files with a single heading: divide the file",
-                                   found=", ".join(cells.values())[:200])  # fmt: skip
+                                   headings=", ".join(cells.values())[:200])  # fmt: skip
                     self.log.problem(self.path.name, text, int(row + place))
                     return
             frame = frame[~is_heading]
