@@ -101,27 +101,37 @@ def read_job(source, show, **options):
     if language is not None:
         speak(language)
     show.step(message("reading_job", "reading {file}", file=str(source)))
-    _skip_docs_of_scipy()
+    load_scipy_lightly()
     from tankcal.job import load  # takes half a second: print the line above first
 
     return load(source, **options)
 
 
-def _skip_docs_of_scipy():
-    """Let scipy load without the docstrings that it composes: a fifth of its loading time.
+def load_scipy_lightly():
+    """Load the base of scipy without docstrings and packages of numpy that no command uses.
 
-    Only for a process that shows no docstrings. Without effect if scipy moves its private module.
+    These take half of the time to load it: scipy composes docstrings, and copies all names of
+    numpy, which loads the Fortran compiler. Only for a process that shows no docstrings. Without
+    effect if scipy moves its private modules.
     """
+    import numpy
+
+    directory, names = numpy.__dir__, numpy.__all__
+    unused = {"f2py", "ma", "testing"}
     with suppress(ImportError):
         from scipy._lib import _docscrape
 
         _docscrape.FunctionDoc = partial(_docscrape.FunctionDoc, doc="")
+        numpy.__dir__ = lambda: [name for name in directory() if name not in unused]
+        numpy.__all__ = [name for name in names if name not in unused]
+        import scipy._lib.array_api_compat.numpy  # noqa: F401
+    numpy.__dir__, numpy.__all__ = directory, names
 
 
 def skip_docs_of_matplotlib():
     """Let matplotlib load without the docstrings that it composes: a third of its loading time.
 
-    As for scipy: only for a process that shows no docstrings.
+    Only for a process that shows no docstrings.
     """
     from matplotlib import artist
 
