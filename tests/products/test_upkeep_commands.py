@@ -3,17 +3,18 @@
 Kind of truth: the same station in plain CSV files; every other file is written from them.
 """
 
+import hashlib
 import json
 import shutil
 
 import numpy as np
 import pytest
-from example_logs import Station, write_station
+from example_logs import Station, TrueTank, write_station
 from test_upkeep_logs import floats, tls
 from test_upkeep_start import METERS, SIZES
 
 from tankcal import cli
-from tankcal.products.upkeep.paper import UpkeepPaper
+from tankcal.products.upkeep.paper import UpkeepPaper, pages
 
 LANGUAGES = ("en", "es", "pt-BR")
 pytestmark = pytest.mark.slow
@@ -334,3 +335,70 @@ def test_parts_of_sales_and_tickets_do_not_count_twice(plain, station, capsys, o
     kind = "meters" if of == "meters.csv.log" else "deliveries"
     (row,) = [row for row in saved["cleaning"] if (row["log"], row["kind"]) == (kind, "duplicate")]
     assert row["count"] == len(rows_of(plain, of)) // 2
+
+
+# ---- integrity
+
+
+def text_of(saved, language="en"):
+    """Text of the report."""
+    return str([block.data for block in pages(UpkeepPaper(saved, language))])
+
+
+@pytest.mark.parametrize("declared", [False, True])
+def test_changed_table_of_the_gauge_through_the_command(station, capsys, declared):
+    """From day 6 on, the gauge states 1 % more volume at equal levels."""
+    lines = ["time,level_mm,volume_l"]
+    for time, level in rows_of(station, "levels.csv"):
+        litres = 1000 * TrueTank().below(float(level) / 1000)
+        lines.append(f"{time},{level},{(1.01 if time > '2025-01-12' else 1.0) * litres:.0f}")
+    (station / "levels.csv").write_text("\n".join(lines) + "\n")
+    if declared:
+        (station / "events.csv").write_text("time,kind\n2025-01-12T00:00:00,table_changed\n")
+        settings = station / "upkeep.toml"
+        settings.write_text(f'{settings.read_text()}\n[events]\nfiles = ["events.csv"]\n')
+    saved = run(station, capsys)
+    codes = [warning["code"] for warning in saved["warnings"]]
+    assert ("upkeep_table_changed" in codes) == (not declared)
+    for language in LANGUAGES:
+        word = UpkeepPaper(saved, language).words["findings"]["table_changed"]
+        assert (word in text_of(saved, language)) == (not declared)
+
+
+def test_removed_sale_shows_in_the_totals_through_the_command(station, capsys):
+    """The log has the counter and the volume of each sale; one row of it is removed."""
+    totals, lines = dict.fromkeys("1234", 1000.0), ["time,begin,meter,total_l,volume_l"]
+    for time, begin, meter, litres in rows_of(station, "meters.csv.log"):
+        totals[meter] += float(litres)
+        lines.append(f"{time},{begin},{meter},{totals[meter]:.3f},{litres}")
+    for removed, count in ((None, None), (300, 1)):
+        kept = [line for number, line in enumerate(lines) if number != removed]
+        (station / "meters.csv.log").write_text("\n".join(kept) + "\n")
+        counts = {row["kind"]: row["count"] for row in run(station, capsys)["cleaning"]}
+        assert counts.get("total_unlike_sum") == count
+
+
+def test_paper_names_each_log_and_its_chain(station, capsys):
+    """SHA-256, rows, first and last hour and chain of each file; a removed file changes them."""
+    days = {}
+    heading, *lines = (station / "levels.csv").read_text().splitlines()
+    for line in lines:
+        days.setdefault("a" if line < "2025-01-10" else "b", []).append(line)
+    (station / "levels.csv").unlink()
+    for name, rows in days.items():
+        (station / f"levels-{name}.csv").write_text("\n".join([heading, *rows]) + "\n")
+    replace_first(station, "upkeep.toml", '"levels.csv"', '"levels-*.csv"')
+    whole = run(station, capsys)
+    for language in LANGUAGES:
+        text = text_of(whole, language)
+        for file in whole["files"]:
+            digest = hashlib.sha256((station / file["file"]).read_bytes()).hexdigest()
+            assert file["sha256"] == digest
+            assert digest[:12] in text
+            assert file["chain"][:12] in text
+        first = next(file for file in whole["files"] if file["file"] == "levels-b.csv")
+        assert (first["rows"], first["first"]) == (len(days["b"]), "2025-01-10T00")
+        assert "2025-01-10 00 h" in text
+    (station / "levels-a.csv").unlink()
+    less = run(station, capsys)
+    assert whole["files"][-1]["chain"][:12] not in text_of(less)

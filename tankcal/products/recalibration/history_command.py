@@ -158,8 +158,9 @@ def _month(month, paper):
     leak = format_with_u(month["leak_l_h"], month["leak_U_l_h"], marks())
     change = format_with_u(month["throughput_percent"], month["throughput_U_percent"], marks())
     return message(
-        "history_month", "  {month}: loss {leak} L/h, U = {U}; throughput {change} %, "
-        "U = {of_change}; {verdict}", month=month["month"], leak=leak.value, U=leak.uncertainty,
+        "history_month", "  {month}: loss {leak} L/h, U = {U} L/h; throughput {change} %, "
+        "U = {of_change} %; {verdict}", month=month["month"], leak=leak.value,
+        U=leak.uncertainty,
         change=change.value, of_change=change.uncertainty,
         verdict=paper.words["month_verdicts"][month["verdict"]],
     )  # fmt: skip
