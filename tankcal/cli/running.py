@@ -16,7 +16,6 @@ from tankcal.terminal.showing import (
     print_paths,
     read_job,
     say,
-    skip_docs_of_matplotlib,
     warn,
 )
 from tankcal.text.digits import (
@@ -140,7 +139,11 @@ def _compute(
         show.end()
         print_doubts(doubts)
     if papers[1]:
-        skip_docs_of_matplotlib()
+        # Docstrings, which no command shows, take a third of the time to load matplotlib.
+        from matplotlib import artist
+
+        artist.kwdoc = lambda _: ""
+        artist.ArtistInspector.get_setters = lambda _: []
     result = None
     if only == "adjustment":
         adjustment = tankcal.adjust_job(job, show.step)

@@ -128,17 +128,6 @@ def load_scipy_lightly():
     numpy.__dir__, numpy.__all__ = directory, names
 
 
-def skip_docs_of_matplotlib():
-    """Let matplotlib load without the docstrings that it composes: a third of its loading time.
-
-    Only for a process that shows no docstrings.
-    """
-    from matplotlib import artist
-
-    artist.kwdoc = lambda _: ""
-    artist.ArtistInspector.get_setters = lambda _: []
-
-
 def prepare_for_small_work():
     """Limit BLAS to one thread and collect garbage less often; both are faster for a command.
 
