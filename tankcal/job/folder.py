@@ -364,7 +364,8 @@ def _content(file, text, log):
         try:
             return tomllib.loads("\n".join(lines))
         except (ValueError, RecursionError) as error:
-            row = _row_of(error)
+            line = re.search(r"at line (\d+)", str(error))
+            row = int(line[1]) if line else None
             number = _DECIMAL_COMMA.fullmatch(lines[row - 1]) if row else None
             is_bare = number is None and str(error).startswith(
                 ("Invalid value", "Expected newline")
@@ -406,11 +407,6 @@ def _bare_value(text):
     return message(
         "bare_text_in_toml", 'found {text}; expected "{text}", with quotation marks', text=text
     )
-
-
-def _row_of(error):
-    line = re.search(r"at line (\d+)", str(error))
-    return int(line[1]) if line else None
 
 
 def _reason(error):

@@ -168,6 +168,7 @@ def adjustment_of(adjustment, measurements=None):
     settings = getattr(measurements, "settings", None)
     test = adjustment.adjusted.test(CONFIDENCE)
     dof = adjustment.redundancy
+    held = adjustment.readings.where(adjustment.readings.hold)
     return fill_from(
         AdjustmentRecord,
         adjustment,
@@ -182,7 +183,7 @@ def adjustment_of(adjustment, measurements=None):
         alpha=ALPHA,
         power=POWER,
         groups=[_group(group) for group in adjustment.groups],
-        held=_list_held(adjustment.readings),
+        held=list(map(_make_held_value, held, _are_controlled(held).tolist())),
         removed=_list_rejected(Readings.of(adjustment.removed)),
         residuals=_columns(adjustment.readings),
         cameras=cameras_of(adjustment, measurements),
@@ -222,12 +223,6 @@ def _are_controlled(readings):
     columns = readings.columns
     of_readings = readings.check | (columns["redundancy"] > UNCONTROLLED)
     return np.where(readings.hold, np.isfinite(columns["mdb"]), of_readings)
-
-
-def _list_held(readings):
-    """Return the `HeldValue` of each value held exactly."""
-    held = readings.where(readings.hold)
-    return list(map(_make_held_value, held, _are_controlled(held).tolist()))
 
 
 def _make_held_value(reading, controlled):

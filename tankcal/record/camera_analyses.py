@@ -261,6 +261,7 @@ class ProductFile(CameraFile, kw_only=True):
 
 def product_of(check):
     """Return the `ProductFile` of a ProductCheck."""
+    scales = dict.fromkeys((verdict.part, verdict.scale) for verdict in check.verdicts)
     return fill_from(
         ProductFile,
         check,
@@ -271,7 +272,10 @@ def product_of(check):
         advised=ADVISED,
         table=fill_from(LimitsUsed, check.table),
         verdicts=[fill_from(ClassJudged, verdict) for verdict in check.verdicts],
-        best=_best_classes(check),
+        best=[
+            BestClass(part, scale, check.best(part, scale), check.best(part, scale, unbiased=True))
+            for part, scale in scales
+        ],
         differences=[
             {"point": name}
             | {f"d{axis}_m": value for axis, value in zip(check.axes, row, strict=True)}
@@ -283,14 +287,6 @@ def product_of(check):
 def plain_product(check):
     """Return the `ProductFile` of a ProductCheck, as plain data."""
     return to_plain(product_of(check))
-
-
-def _best_classes(check):
-    scales = dict.fromkeys((verdict.part, verdict.scale) for verdict in check.verdicts)
-    return [
-        BestClass(part, scale, check.best(part, scale), check.best(part, scale, unbiased=True))
-        for part, scale in scales
-    ]
 
 
 # ---- influence of calibrations on a block: kind "influence" of camera.json

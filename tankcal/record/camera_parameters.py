@@ -247,6 +247,10 @@ def plain_parameters(result):
     limit, parts = result.limit, result.components
     known = not math.isnan(limit.um) or not math.isnan(limit.px)
     unscaled = parts.unscaled or parts.of == "covariance"
+    components = [
+        HighComponent(number + 1, share, [Loading(*loading) for loading in high])
+        for number, share, high in result.silva.high
+    ]
     file = fill_from(
         ParametersFile,
         result,
@@ -259,7 +263,7 @@ def plain_parameters(result):
         without=[_trial(result, trial) for trial in result.trials],
         with_all=result.base and WithAll(result.base[1], *_volume(result.base[0])),
         rules=PublishedRules(
-            _silva(result.silva),
+            fill_from(SilvasRule, result.silva, components=components),
             fill_from(
                 PessoasRule, result.pessoa, keep=[KeptBecause(*kept) for kept in result.pessoa.keep]
             ),
@@ -331,11 +335,3 @@ def _volume(volume):
     """Return the values of `TopOfTable`; each is None without volume."""
     top = fill_from(TopOfTable, volume)
     return [None] * len(fields(TopOfTable)) if top is None else vars(top).values()
-
-
-def _silva(rule):
-    components = [
-        HighComponent(number + 1, share, [Loading(*loading) for loading in high])
-        for number, share, high in rule.high
-    ]
-    return fill_from(SilvasRule, rule, components=components)

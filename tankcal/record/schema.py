@@ -197,7 +197,11 @@ def _schema_of(kind, definitions):
     if origin is Annotated:
         base, mark = arguments
         if isinstance(mark, Columns):
-            return _columns_schema(mark.of, definitions)
+            columns = {
+                item.key: {"type": "array", "items": _schema_of(item.type, definitions)}
+                for item in keys_of(mark.of)
+            }
+            return {"type": "object", "properties": columns, "required": list(columns)}
         return {"type": "number"} if mark == "finite" else _schema_of(base, definitions)
     if origin in (Union, types.UnionType):
         return _union_schema(arguments, definitions)
@@ -253,14 +257,6 @@ def _reference(cls, definitions):
 def _property(item, definitions):
     schema = _schema_of(item.type, definitions)
     return {"description": item.doc} | schema if item.doc else schema
-
-
-def _columns_schema(cls, definitions):
-    columns = {
-        item.key: {"type": "array", "items": _schema_of(item.type, definitions)}
-        for item in keys_of(cls)
-    }
-    return {"type": "object", "properties": columns, "required": list(columns)}
 
 
 # ---- comparison of data with a schema

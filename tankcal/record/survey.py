@@ -308,7 +308,8 @@ def courses_of(result):
     if job.tank.kind != "vertical":
         return []
     if result.wall is not None:
-        measured = partial(_surveyed_course, _rejected_z_m(result))
+        rejected = np.isin(result.wall.shell.reason, ("consensus", "snooping"))
+        measured = partial(_surveyed_course, result.job.points.xyz_m[rejected, 2])
     else:
         measured = partial(_course_without_points, next(iter(result.surveys.values())))
     surveyed = shell_by_survey(result)
@@ -338,12 +339,6 @@ def courses_of(result):
             )
         )
     return rows
-
-
-def _rejected_z_m(result):
-    """Return the z coordinates, shape (k,), of rejected points near the wall."""
-    rejected = np.isin(result.wall.shell.reason, ("consensus", "snooping"))
-    return result.job.points.xyz_m[rejected, 2]
 
 
 def _surveyed_course(rejected_z_m, result, index, shape):

@@ -189,7 +189,9 @@ def write_camera(kind, cameras, sds=None, radius_mm=0.0, file="cameras"):
     if kind == "cameras.toml":
         return _write_register(cameras, sds)
     if kind == "aicon":
-        return _write_balanced(cameras, radius_mm)
+        camera = cameras[0][1]
+        converted = balanced.convert_to_balanced(camera, radius_mm)
+        return CameraText(balanced.format_text(converted, camera), (converted.error_px,))
     return _write_in_pixels(kind, cameras)
 
 
@@ -220,13 +222,6 @@ def _write_register(cameras, sds):
         for (name, camera), sd in zip(cameras, sds, strict=True)
     ]
     return CameraText("\n".join(entries), tuple(camera.error_px for _, camera in cameras))
-
-
-def _write_balanced(cameras, radius_mm):
-    """Text of a camera in the balanced form."""
-    camera = cameras[0][1]
-    converted = balanced.convert_to_balanced(camera, radius_mm)
-    return CameraText(balanced.format_text(converted, camera), (converted.error_px,))
 
 
 def _write_in_pixels(kind, cameras):

@@ -93,7 +93,8 @@ def find_surface(
         surface, ends_m_found = _fit_surface(xyz_m, kind, ends_m, radius_m, azimuth_rad)
         if outwards is not None and not (kind == "horizontal" and np.any(outwards < 0)):
             surface = _choose_surface(surface, ends_m_found, xyz_m, outwards, radius_m)
-        _refuse_radius(surface, radius_m)
+        if abs(surface.radius_m / radius_m - 1) > WIDE:
+            raise SolutionError(_message_other_radius(radius_m, surface.radius_m))
         return surface, ends_m_found
     except SolutionError as error:
         units = {} if is_unit_defined else UNITS
@@ -186,12 +187,6 @@ def _fit_rear_cylinder(first, ends_m, cells, radius_m):
         return _fit_axis(sampled, joints, radius_m, middle, first.frame)
     except SolutionError:
         return None
-
-
-def _refuse_radius(surface, radius_m):
-    """Raise SolutionError if the radius differs from the nominal radius by more than 3 %."""
-    if abs(surface.radius_m / radius_m - 1) > WIDE:
-        raise SolutionError(_message_other_radius(radius_m, surface.radius_m))
 
 
 def _message_other_radius(nominal_m, found_m):

@@ -209,6 +209,7 @@ def _of_horizontal(values, tables):
     all_flat = given["end_a"] == given["end_b"] == "flat"
     switched_off = _switched_off("tilt") if no_tilt else ""
     sizes = _of_rings(values, tables) if wall == "straps" else _of_one_cylinder()
+    ends = [{key: given[f"end_{end}_{key}"] for key in SIZES_OF_END} for end in "ab"]
     return (
         _of_wall(given, values, has_points)
         | sizes
@@ -216,7 +217,7 @@ def _of_horizontal(values, tables):
             "end_depth": message("ends_are_flat", "expected only with an end that is not flat")
             if all_flat
             else "",
-            **_of_radii_of_ends(given),
+            **_of_radii_of(ends),
             **dict.fromkeys(("tube_angle", "tube_offset"), _of_tube(given, wall)),
             "tilt": _from_points(has_points) or switched_off,
             "dip_position": ""
@@ -246,12 +247,6 @@ def _of_rings(values, tables):
         if is_single
         else "",
     }
-
-
-def _of_radii_of_ends(given):
-    """Reasons for the radii of the two ends."""
-    ends = [{key: given[f"end_{end}_{key}"] for key in SIZES_OF_END} for end in "ab"]
-    return _of_radii_of(ends)
 
 
 def _of_radii_of(heads):

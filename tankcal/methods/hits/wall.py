@@ -142,7 +142,8 @@ def sight_wall(job, adjustment, progress):
     sighting = sight(job.hits, poses)
     refuse_misread_heights(job, sighting)
     sighting = replace(sighting, beside=_targets_beside(job, poses, adjustment))
-    _refuse_side(job, sighting)
+    if not np.any(sighting.is_inside == (job.survey.side == "inside")):
+        raise _wrong_side_error(job)
     _refuse_unknown_offset(job, sighting)
     return _as_points(job, sighting)
 
@@ -168,12 +169,6 @@ def _targets_beside(job, poses, adjustment):
         return None
     points = wall_points(adjustment, job.measurements, job.survey.side)
     return Beside(points, covariance_with_points(job.hits, poses, adjustment, points.names))
-
-
-def _refuse_side(job, sighting):
-    """Raise InputError if all set-ups lie on the other side of the wall than declared."""
-    if not np.any(sighting.is_inside == (job.survey.side == "inside")):
-        raise _wrong_side_error(job)
 
 
 def _refuse_stations_outside(job):

@@ -422,7 +422,8 @@ def _check_tape(job, wall):
 
 def _check_ends(job, wall, radius_m):
     """Warning of points of the wall above the top or below the bottom of the shell."""
-    xyz, (low, high) = job.points.xyz_m, _ends(job)
+    xyz, low = job.points.xyz_m, job.datum.bottom_z_m
+    high = low + sum(course.height_m for course in job.courses)
     axis = _axis_at(wall.shell, xyz[:, 2])
     distance = np.abs(np.hypot(*(xyz[:, :2] - axis).T) - radius_m)
     is_near = distance < NEAR_WALL * radius_m
@@ -443,12 +444,6 @@ def _check_ends(job, wall, radius_m):
         )
         return [Problem("job.toml", text, column="datum.bottom_z_m")]
     return []
-
-
-def _ends(job):
-    """Heights of the bottom and of the top of the shell, m."""
-    bottom = job.datum.bottom_z_m
-    return bottom, bottom + sum(course.height_m for course in job.courses)
 
 
 def _axis_at(shell, z_m):

@@ -57,7 +57,10 @@ def _part(job, survey, switches):
     else:
         solid = _lying(job.horizontal, plate, scale)
     if job.points is not None:
-        survey_results = _arguments_of_scan(survey, scale)
+        factors = tuple(
+            replace(factor, columns=scale**3 * factor.columns) for factor in survey.form.factors
+        )
+        survey_results = {"surveyed": survey.names, "form": replace(survey.form, factors=factors)}
         # Offsets of instruments are among the factors of the points.
         if any(method.has_own_offset for method in given_methods(job)):
             unused = (*unused, "offset")
@@ -65,7 +68,11 @@ def _part(job, survey, switches):
     if (
         switches.head and pressure.is_there and job.sphere.thickness_m
     ):  # otherwise the stiffness is unknown
-        solid = PressedSphere(solid, _membrane(job), pressure)
+        poisson = job.material.poisson
+        ratio = POISSON if poisson is None else poisson
+        solid = PressedSphere(
+            solid, Membrane(job.sphere.thickness_m, job.material.e_pa, ratio), pressure
+        )
         unused = tuple(name for name in unused if name != "plate_thickness")
         declared = {"pressure": pressure.gas_pa, "survey_pressure": pressure.survey_gas_pa}
         unused += tuple(name for name, pascals in declared.items() if not pascals)
@@ -132,14 +139,6 @@ def _with_sizes(job, names, values):
     return replace(job, horizontal=lying)
 
 
-def _arguments_of_scan(scan, scale):
-    """Results of a scan as arguments of `SolidPart`; volumes are scaled."""
-    factors = tuple(
-        replace(factor, columns=scale**3 * factor.columns) for factor in scan.form.factors
-    )
-    return {"surveyed": scan.names, "form": replace(scan.form, factors=factors)}
-
-
 def pressure_of(job):
     """`Pressure` of the table and of the survey of a sphere; zero for other tanks."""
     if job.sphere is None:
@@ -152,12 +151,6 @@ def pressure_of(job):
         survey_density_kg_m3=survey.liquid_density_kg_m3 or 0.0,
         survey_level_m=(survey.liquid_level_m or 0.0) + solid_zero(job),
     )
-
-
-def _membrane(job):
-    poisson = job.material.poisson
-    ratio = POISSON if poisson is None else poisson
-    return Membrane(job.sphere.thickness_m, job.material.e_pa, ratio)
 
 
 def _lying(tank, plate_m, scale):

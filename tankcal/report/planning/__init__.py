@@ -66,7 +66,10 @@ def write(
     refuse_foreign(directory)
     progress = progress or (lambda text: None)
     with folders.replace_folder(directory, language) as temporary:
-        paper_class = _paper_class(prediction)
+        from tankcal.planning.wall.prediction import WallPrediction
+        from tankcal.report.planning.wall_paper import WallPaper
+
+        paper_class = WallPaper if isinstance(prediction, WallPrediction) else PlanPaper
         paper = paper_class(prediction, language, effects, design, simulated)
         _write(paper, temporary, progress, workbook)
         if design is not None and design.steps:
@@ -76,13 +79,6 @@ def write(
         _refuse_filled(directory)  # completed while the files were written
     names = (*FILES, JOB, DESIGN)
     return [path for path in (Path(directory) / name for name in names) if path.exists()]
-
-
-def _paper_class(prediction):
-    from tankcal.planning.wall.prediction import WallPrediction
-    from tankcal.report.planning.wall_paper import WallPaper
-
-    return WallPaper if isinstance(prediction, WallPrediction) else PlanPaper
 
 
 def _write(paper, folder, progress, as_workbook):

@@ -77,7 +77,11 @@ def write(record, path, language=None, digest=None):
         if record["capacity"]:
             _sheets_of_tank(book, record)
         else:
-            _sheets_of_survey(book, record)
+            adjustment_sheet(book, record)
+            points_sheet(book, record)
+            observations_sheet(book, record)
+            cameras_sheet(book, record)
+            provenance_sheet(book, record)
         book.write_index()
 
 
@@ -113,12 +117,3 @@ def _sheets_of_tank(book, record):
         cameras_sheet(book, record)
     provenance_sheet(book, record)
     charts_sheets(book, record, rows)
-
-
-def _sheets_of_survey(book, record):
-    """Write the sheets of an adjusted survey without tank."""
-    adjustment_sheet(book, record)
-    points_sheet(book, record)
-    observations_sheet(book, record)
-    cameras_sheet(book, record)
-    provenance_sheet(book, record)

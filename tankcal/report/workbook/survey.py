@@ -150,18 +150,13 @@ def observations_sheet(book, record):
     subtitle = book.word("texts.residuals_subtitle")
     if count > MOST_READINGS:
         subtitle = book.word("texts.worst_subtitle", shown=MOST_READINGS, all=count)
-        readings = _worst(readings)
+        size = np.abs(np.nan_to_num(readings.arrays["w"]))
+        rank = np.lexsort((-size, ~readings.arrays["removed"]))
+        readings = readings.take(np.sort(rank[:MOST_READINGS]))
     rows = list(convert_units(readings).rows())
     muted = [i for i, row in enumerate(rows) if row["removed"]]
     table = cell_table(book, READINGS, rows, name="observations", muted=muted)
     write_sheet(book, SheetContent("observations", [table], subtitle, is_filtered=True))
-
-
-def _worst(readings):
-    """Select MOST_READINGS readings: rejected readings, then the largest |w|."""
-    size = np.abs(np.nan_to_num(readings.arrays["w"]))
-    rank = np.lexsort((-size, ~readings.arrays["removed"]))
-    return readings.take(np.sort(rank[:MOST_READINGS]))
 
 
 # ---- cameras and photographs

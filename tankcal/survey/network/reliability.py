@@ -32,7 +32,7 @@ import numpy as np
 import scipy.sparse
 from scipy.special import chdtri, ndtri, stdtrit
 
-from tankcal.adjust import ALPHA, POWER, UNCONTROLLED, noncentrality
+from tankcal.adjust import ALPHA, UNCONTROLLED, noncentrality
 from tankcal.solver.effects import (
     constraint_reactions,
     own_leverage,
@@ -150,21 +150,19 @@ def tau_limit(alpha, dof):
     return float(t * np.sqrt(dof) / np.sqrt(dof - 1 + t * t))
 
 
-def residuals_of(problem, solution, alpha=ALPHA, power=POWER):
+def residuals_of(problem, solution):
     """Residuals of each group of a solved Problem, followed by exact observations.
 
     Parameters
     ----------
     problem : Problem
     solution : solver solution
-    alpha, power : float
-        Significance level and power of the tests.
 
     Returns
     -------
     tuple of Residuals
     """
-    delta0 = noncentrality(alpha, power)
+    delta0 = noncentrality()
     tables = [_table(problem, solution, number, delta0) for number in range(problem.ordinary)]
     blocks = [
         table
@@ -391,7 +389,7 @@ class Reactions:
         size = np.sqrt(np.where(self.square > 0, self.square, 1.0))
         return np.where(self.square > 0, self.reaction / size, 0.0)
 
-    def residuals(self, problem, alpha=ALPHA, power=POWER):
+    def residuals(self, problem):
         """Residuals of the held coordinates: residual and sd 0; w, mdb and effect from the
         reactions.
 
@@ -401,7 +399,6 @@ class Reactions:
         Parameters
         ----------
         problem : Problem
-        alpha, power : float
 
         Returns
         -------
@@ -410,7 +407,7 @@ class Reactions:
         columns = np.unique(problem.layout.points)
         moves = np.abs(self.changes[columns[columns >= 0]]).max(axis=0, initial=0.0)
         with np.errstate(divide="ignore"):
-            mdb = noncentrality(alpha, power) / np.sqrt(self.square)
+            mdb = noncentrality() / np.sqrt(self.square)
         none = np.zeros((len(self.rows), 1))
         return Residuals(
             kind="control coordinate", unit="m", source=HELD, rows=self.rows,

@@ -504,7 +504,9 @@ def _cached_poses(first, second, seed):
         if pose is None or any(_are_alike(pose, pose_before) for pose_before in rough):
             continue
         rough.append(pose)
-        pair = _pair(pose, f1, f2)
+        rotation, base, error = _refine(*pose, f1, f2)
+        cosine = np.sum(f1 * (f2 @ rotation), axis=1)
+        pair = Pair(rotation, base, error, float(np.median(np.arccos(np.clip(cosine, -1, 1)))))
         if not any(_are_alike((pair.rotation, pair.base), (o.rotation, o.base)) for o in pairs):
             pairs.append(pair)
     pairs.sort(key=lambda pair: pair.error)
@@ -591,13 +593,6 @@ def _decompose(matrix, f1, f2):
             if share > most:
                 best, most = (rotation, base), share
     return best
-
-
-def _pair(pose, f1, f2):
-    """The refined Pair of a rotation and a base."""
-    rotation, base, error = _refine(*pose, f1, f2)
-    cosine = np.sum(f1 * (f2 @ rotation), axis=1)
-    return Pair(rotation, base, error, float(np.median(np.arccos(np.clip(cosine, -1, 1)))))
 
 
 def _is_in_front(rotation, base, f1, f2):

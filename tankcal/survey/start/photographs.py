@@ -26,6 +26,7 @@ FLAT_WALL = 0.03  # relative scatter about a circle below which points lie on a 
 RAYS = 12  # rays used of a point with more
 SHARE = 0.5  # share of the most known points below which a photo waits for more
 TRIPLES = 120  # samples of three points
+RAY_ROUNDS = 12  # iterations of the weights of rays
 JUDGES = 100  # points used to compare poses
 REFINING = 400  # points used to refine a pose
 REFINING_STEPS = 15
@@ -265,7 +266,7 @@ class Pose:
     error: float
 
 
-def resect(xyz_m, ideal, rng, count=TRIPLES):
+def resect(xyz_m, ideal, rng):
     """Best Pose of a photo.
 
     Parameters
@@ -275,18 +276,16 @@ def resect(xyz_m, ideal, rng, count=TRIPLES):
     ideal : ndarray, shape (n, 2)
         Ideal image points over c.
     rng : numpy.random.Generator
-    count : int
-        Number of samples.
 
     Returns
     -------
     Pose or None
     """
-    poses = find_poses(xyz_m, ideal, rng, count)
+    poses = find_poses(xyz_m, ideal, rng)
     return poses[0] if poses else None
 
 
-def find_poses(xyz_m, ideal, rng, count=TRIPLES):
+def find_poses(xyz_m, ideal, rng):
     """Best Pose of a photo and, for few points, other poses that fit.
 
     Parameters
@@ -295,8 +294,6 @@ def find_poses(xyz_m, ideal, rng, count=TRIPLES):
     ideal : ndarray, shape (n, 2)
         Ideal image points over c.
     rng : numpy.random.Generator
-    count : int
-        Number of samples.
 
     Returns
     -------
@@ -304,7 +301,7 @@ def find_poses(xyz_m, ideal, rng, count=TRIPLES):
         The best first.
     """
     n = len(xyz_m)
-    triples = rng.integers(0, n, (count, 3))
+    triples = rng.integers(0, n, (TRIPLES, 3))
     # A sample with a repeated point has no solution.
     triples = triples[(np.diff(np.sort(triples, axis=1), axis=1) > 0).all(axis=1)]
     if n < FEW:
@@ -484,7 +481,7 @@ def _linearise(xyz_m, ideal, centre, rotation):
     return np.column_stack([x, y]) - ideal, a
 
 
-def intersect_rays(centres, directions, owner, points, rounds=12):
+def intersect_rays(centres, directions, owner, points):
     """Points nearest to rays, with Cauchy weights.
 
     Parameters
@@ -494,8 +491,6 @@ def intersect_rays(centres, directions, owner, points, rounds=12):
         Number of the point of each ray.
     points : int
         Number of points.
-    rounds : int
-        Iterations of the weights.
 
     Returns
     -------
@@ -511,7 +506,7 @@ def intersect_rays(centres, directions, owner, points, rounds=12):
     pull = np.einsum("nij,nj->ni", across, centres)
     parts = np.column_stack([across.reshape(-1, 9), pull])
     weight, xyz = np.ones(len(owner)), np.full((points, 3), np.nan)
-    for _ in range(rounds):
+    for _ in range(RAY_ROUNDS):
         sums = [np.bincount(owner, weights=weight * part, minlength=points) for part in parts.T]
         normal, right = np.stack(sums[:9], axis=1).reshape(-1, 3, 3), np.stack(sums[9:], axis=1)
         sound = np.flatnonzero(count > 1)

@@ -105,7 +105,9 @@ def look_up(groups, values, wanted):
 
 def plan_of(survey):
     """The Plan of a survey, without rejected observations."""
-    groups = [_remove_rejected(item) for item in survey.observations]
+    groups = [
+        (item if item.use is None else item.taken(item.use > 0)) for item in survey.observations
+    ]
     circles = _Circles(len(survey.sets))
     for item in groups:
         if isinstance(item, Directions):
@@ -118,11 +120,6 @@ def plan_of(survey):
     return Plan(
         *circles.rows(), *circles.zeros(), *_distances(survey, groups), *_slopes(groups), points
     )
-
-
-def _remove_rejected(observations):
-    """Observations without rejected rows."""
-    return observations if observations.use is None else observations.taken(observations.use > 0)
 
 
 def _join_columns(parts, kinds):

@@ -84,7 +84,7 @@ def _wrap_angles(angle):
     return angle - 2 * np.pi * np.round(angle / (2 * np.pi))
 
 
-def improve_plan_positions(plan, xy_m, z_m, held, north=True):
+def improve_plan_positions(plan, xy_m, z_m, held):
     """Recompute each position in plan from the others, so that blunders are outvoted.
 
     Parameters
@@ -94,8 +94,6 @@ def improve_plan_positions(plan, xy_m, z_m, held, north=True):
     z_m : ndarray, shape (points,)
     held : ndarray of bool, shape (points,)
         Positions that stay.
-    north : bool
-        Whether +y of the frame is the zero of azimuths.
 
     Returns
     -------
@@ -106,7 +104,7 @@ def improve_plan_positions(plan, xy_m, z_m, held, north=True):
     occupied[plan.at[plan.at >= 0]] = True
     free = np.isfinite(xy[:, 0]) & ~held
     for _ in range(IMPROVING):
-        zeros, before = orient_circles(plan, xy, north), xy.copy()
+        zeros, before = orient_circles(plan, xy), xy.copy()
         doubtful = free & ~occupied & _disagreeing(plan, xy, zeros, lengths, free)
         _place_points(plan, xy, zeros, lengths, 3, doubtful, False)
         _place_stations(plan, xy, lengths, 3, free & occupied, False)
