@@ -1,12 +1,15 @@
 """Settings of a product: a TOML file with sections of declared keys, and its empty files."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.job.entries import read_section, unknown_section
 from tankcal.job.folder import MAX_SETTINGS_BYTES, declared_marks, flattened, read_toml
 from tankcal.job.tables import read_bytes
+from tankcal.messages import Message
+from tankcal.text.words import load_words
 
 
 def read_sections(source, sections, log, name=None):
@@ -67,72 +70,71 @@ def fill_blanks(values, defaults):
     }
 
 
-def write_empty_files(folder, texts, exists):
-    """Write the empty files of a product.
+@dataclass(frozen=True)
+class EmptyFiles:
+    """Empty input files of a product, with a note beside each key and column.
 
-    Parameters
+    Attributes
     ----------
-    folder : path
-        Created if missing.
-    texts : dict of {str: str}
-        {name of a file: content}.
+    product : str
+        Section of the words with the notes.
+    settings : (str, dict)
+        Name of the TOML file, and {section: tuple of Field}; the section csv is left out.
+    table : (str, tuple of Field, str, str)
+        Name of the CSV file, its columns, and the keys of its notes and of its heading.
     exists : Message
         The problem of a file that is there already; none is then written.
-
-    Returns
-    -------
-    list of str
-        Names of the files.
-
-    Raises
-    ------
-    InputError
-        If a file exists.
-    """
-    folder = Path(folder)
-    existing = [name for name in texts if (folder / name).exists()]
-    if existing:
-        raise InputError([Problem(name, exists) for name in existing])
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, text in texts.items():
-        (folder / name).write_text(text, encoding="utf-8")
-    return list(texts)
-
-
-def empty_settings(sections, notes, heading, fill_in, asked=()):
-    """Return the text of a TOML file with every key blank, and its note beside it.
-
-    Parameters
-    ----------
-    sections : dict
-        {section: tuple of Field}; the section csv is left out.
-    notes : dict
-        {section: {key: note}}.
-    heading : str
-        Comment of the first line.
-    fill_in : str
-        Words before the notes of the keys to fill in.
-    asked : collection of (str, str), optional
+    asked : collection of (str, str)
         Section and key to fill in although a Field does not require it.
-
-    Returns
-    -------
-    str
+    shared_notes : dict
+        {section: key of its notes}, where it is not the section.
     """
-    lines = [f"# {heading}"]
-    for section, fields in sections.items():
-        if section == "csv":
-            continue
-        lines += ["", f"[{section}]"]
-        for field in fields:
-            choices = f" ({', '.join(field.choices)})" if field.choices else ""
-            ask = f"{fill_in}: " if field.required or (section, field.name) in asked else ""
-            setting = f'{field.name} = ""'
-            lines.append(f"{setting:<32} # {ask}{notes[section][field.name]}{choices}")
-    return "\n".join(lines) + "\n"
 
+    product: str
+    settings: tuple
+    table: tuple
+    exists: Message
+    asked: tuple = ()
+    shared_notes: Mapping = field(default_factory=dict)
 
-def empty_table(columns, notes, heading):
-    """Return the text of a CSV file without rows: notes {column: note}, and the headings."""
-    lines = [f"# {heading}", *(f"# {field.name}: {notes[field.name]}" for field in columns)]
-    return "\n".join([*lines, ",".join(field.name for field in columns)]) + "\n"
+    def write(self, folder, language):
+        """Write the files to a folder, which is created if missing; return their names.
+
+        Raises
+        ------
+        InputError
+            If a file exists.
+        """
+        words, folder = load_words(language), Path(folder)
+        notes, fill_in = words[self.product]["notes"], words["input"]["files"]["fill_in"]
+        texts = {
+            self.settings[0]: self._settings_text(notes, fill_in),
+            self.table[0]: self._table_text(notes),
+        }
+        existing = [name for name in texts if (folder / name).exists()]
+        if existing:
+            raise InputError([Problem(name, self.exists) for name in existing])
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in texts.items():
+            (folder / name).write_text(text, encoding="utf-8")
+        return list(texts)
+
+    def _settings_text(self, notes, fill_in):
+        lines = [f"# {notes['files']['settings'].format(fill_in=fill_in)}"]
+        for section, fields in self.settings[1].items():
+            if section == "csv":
+                continue
+            lines += ["", f"[{section}]"]
+            of_section = notes[self.shared_notes.get(section, section)]
+            for key in fields:
+                choices = f" ({', '.join(key.choices)})" if key.choices else ""
+                ask = f"{fill_in}: " if key.required or (section, key.name) in self.asked else ""
+                setting = f'{key.name} = ""'
+                lines.append(f"{setting:<32} # {ask}{of_section[key.name]}{choices}")
+        return "\n".join(lines) + "\n"
+
+    def _table_text(self, notes):
+        _, columns, of_columns, heading = self.table
+        lines = [f"# {notes['files'][heading]}"]
+        lines += [f"# {column.name}: {notes[of_columns][column.name]}" for column in columns]
+        return "\n".join([*lines, ",".join(column.name for column in columns)]) + "\n"

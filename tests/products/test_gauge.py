@@ -26,7 +26,7 @@ from tankcal.products.gauge.deviation import (
     tilt_of_slope,
 )
 from tankcal.products.gauge.paper import DOCUMENT, GaugePaper
-from tankcal.products.gauge.reading import UNCERTAINTIES, read_comparison, shell_of, write_starter
+from tankcal.products.gauge.reading import EMPTY_FILES, UNCERTAINTIES, read_comparison, shell_of
 from tankcal.record.schema import to_plain
 from tankcal.report.verification import verify
 from tankcal.text.shipped import LANGUAGES, shipped_folder
@@ -585,12 +585,12 @@ def test_budget_adds_up(folder):
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_starter_is_complete_once_filled_in(tmp_path, language):
     place = tmp_path / "new"
-    assert write_starter(place, language) == ["gauge.toml", "readings.csv"]
+    assert EMPTY_FILES.write(place, language) == ["gauge.toml", "readings.csv"]
     with pytest.raises(InputError) as refused:
         read_comparison(place)
     assert len(refused.value.problems) >= 4
     with pytest.raises(InputError):
-        write_starter(place, language)
+        EMPTY_FILES.write(place, language)
     text = (place / "gauge.toml").read_text(encoding="utf-8")
     for key, value in (
         ("date", '"2026-11-20"'), ("resolution_mm", "1"), ("supported_by", '"bottom"'),

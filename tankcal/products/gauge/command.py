@@ -48,9 +48,9 @@ def add(commands):
 def _gauge(options):
     speak(options.language)
     if options.new:
-        from tankcal.products.gauge.reading import write_starter
+        from tankcal.products.gauge.reading import EMPTY_FILES
 
-        print_paths(options.folder, write_starter(options.folder, language_of_run()))
+        print_paths(options.folder, EMPTY_FILES.write(options.folder, language_of_run()))
         return
     from tankcal.products.gauge.commissioning import commission
     from tankcal.products.gauge.reading import read_comparison

@@ -20,17 +20,10 @@ from tankcal.messages import message
 from tankcal.products.exports.exporting import shortening_m
 from tankcal.products.gauge.deviation import LEAST_LEVELS, Dips, KnownSlope, slope_of_tilt
 from tankcal.products.gauge.saved import GaugeCourse, GaugeRecord
-from tankcal.products.settings import (
-    empty_settings,
-    empty_table,
-    fill_blanks,
-    read_sections,
-    write_empty_files,
-)
+from tankcal.products.settings import EmptyFiles, fill_blanks, read_sections
 from tankcal.record.manifest import digest_of
 from tankcal.tank import gauging
 from tankcal.text.shipped import LANGUAGES
-from tankcal.text.words import load_words
 
 SETTINGS, READINGS = "gauge.toml", "readings.csv"
 SUPPORTS = ("bottom", "shell")
@@ -557,32 +550,9 @@ def _find_slope(source, names):
 # ---- empty input files
 
 
-def write_starter(folder, language):
-    """Write gauge.toml and readings.csv to fill in.
-
-    Parameters
-    ----------
-    folder : path
-        Created if missing; existing files are not replaced.
-    language : str
-        Language of the notes.
-
-    Returns
-    -------
-    list of str
-        Names of the written files.
-
-    Raises
-    ------
-    InputError
-        If a file exists, or the folder cannot be written.
-    """
-    words = load_words(language)
-    notes, fill_in = words["gauge"]["notes"], words["input"]["files"]["fill_in"]
-    heading = notes["files"]["settings"].format(fill_in=fill_in)
-    texts = {
-        SETTINGS: empty_settings(SECTIONS, notes, heading, fill_in),
-        READINGS: empty_table(COLUMNS, notes["readings"], notes["files"]["readings"]),
-    }
-    exists = message("gauge_exists", "exists already; expected a folder without it")
-    return write_empty_files(folder, texts, exists)
+EMPTY_FILES = EmptyFiles(
+    "gauge",
+    (SETTINGS, SECTIONS),
+    (READINGS, COLUMNS, "readings", "readings"),
+    message("gauge_exists", "exists already; expected a folder without it"),
+)

@@ -74,9 +74,9 @@ def add(commands):
 def _upkeep(options):
     speak(options.language)
     if options.new:
-        from tankcal.products.upkeep.reading import write_starter
+        from tankcal.products.upkeep.reading import EMPTY_FILES
 
-        print_paths(options.folder, write_starter(options.folder, language_of_run()))
+        print_paths(options.folder, EMPTY_FILES.write(options.folder, language_of_run()))
         return
     from tankcal.products.upkeep.paper import DOCUMENT, UpkeepPaper
     from tankcal.products.upkeep.reading import read_upkeep

@@ -19,13 +19,7 @@ from tankcal.job.folder import read_csv
 from tankcal.job.tables import Log, read_bytes, shown
 from tankcal.messages import message
 from tankcal.products.quantity.table import read_table
-from tankcal.products.settings import (
-    empty_settings,
-    empty_table,
-    fill_blanks,
-    read_sections,
-    write_empty_files,
-)
+from tankcal.products.settings import EmptyFiles, fill_blanks, read_sections
 from tankcal.products.upkeep.causes import PRIORS, Meter, Operation, TableStock
 from tankcal.products.upkeep.flows import quiet_windows, read_flows
 from tankcal.products.upkeep.levels import MOST_OFFSET_S, LevelSums
@@ -44,7 +38,6 @@ from tankcal.products.upkeep.state import NO_STATE
 from tankcal.products.upkeep.steps import REASONS, StepRules, Tickets, build_steps
 from tankcal.record.manifest import digest_of
 from tankcal.text.shipped import LANGUAGES
-from tankcal.text.words import load_words
 
 FIXED = ("settings", "record")  # kinds of files that are no logs
 SETTINGS, METERS = "upkeep.toml", "meters.csv"
@@ -549,33 +542,11 @@ def _read_air(files):
     return time[order].astype(float), values[order]
 
 
-def write_starter(folder, language):
-    """Write upkeep.toml and meters.csv to fill in.
-
-    Parameters
-    ----------
-    folder : path
-        Created if missing; existing files are not replaced.
-    language : str
-        Language of the notes.
-
-    Returns
-    -------
-    list of str
-        Names of the written files.
-
-    Raises
-    ------
-    InputError
-        If a file exists, or the folder cannot be written.
-    """
-    words = load_words(language)
-    notes, fill_in = words["upkeep"]["notes"], words["input"]["files"]["fill_in"]
-    heading = notes["files"]["settings"].format(fill_in=fill_in)
-    of_sections = notes | dict.fromkeys(LOGS, notes["logs"])
-    texts = {
-        SETTINGS: empty_settings(SECTIONS, of_sections, heading, fill_in, ASKED),
-        METERS: empty_table(METER_COLUMNS, notes["meter"], notes["files"]["meters"]),
-    }
-    exists = message("upkeep_exists", "exists already; expected a folder without it")
-    return write_empty_files(folder, texts, exists)
+EMPTY_FILES = EmptyFiles(
+    "upkeep",
+    (SETTINGS, SECTIONS),
+    (METERS, METER_COLUMNS, "meter", "meters"),
+    message("upkeep_exists", "exists already; expected a folder without it"),
+    ASKED,
+    dict.fromkeys(LOGS, "logs"),
+)
