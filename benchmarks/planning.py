@@ -19,8 +19,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from measured import Row, tell
 
 from tankcal.planning import load_plan, predict
-from tankcal.planning.changes import changes_of
-from tankcal.planning.improvements import greedy
+from tankcal.planning.improvements import changes_of, greedy
 from tankcal.record.plan import plain_of
 
 PLAN = Path(__file__).resolve().parents[1] / "examples" / "plan-silva"

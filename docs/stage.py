@@ -44,7 +44,6 @@ REFERENCE = {  # {title: modules of a page of the reference}, in the order of th
             "field.components",
             "field.amplitudes",
             "field.estimate",
-            "patches",
             "rotations",
         )
     ),
@@ -68,7 +67,7 @@ REFERENCE = {  # {title: modules of a page of the reference}, in the order of th
     "Planning": ("tankcal.planning",),
     "Field books": ("tankcal.products.fieldbooks.importing",),
     "Clouds": ("tankcal.clouds", "tankcal.clouds.wall", "tankcal.clouds.inside"),
-    "Linter": ("tankcal.products.linter.linting", "tankcal.products.linter.totals"),
+    "Linter": ("tankcal.products.linter.linting", "tankcal.products.linter.volumes"),
 }
 # Documented with `tankcal`.
 TWICE = {"tankcal.survey": "Adjustment", "tankcal.products.linter.linting": "lint"}

@@ -16,12 +16,11 @@ from tankcal.planning import load_plan, predict
 from tankcal.products.inspection.inspecting import Asked as ToInspect
 from tankcal.products.inspection.inspecting import inspect_files
 from tankcal.products.recalibration.comparison import Asked, compare_files
-from tankcal.products.recalibration.history_inputs import history_of_files
+from tankcal.products.recalibration.history import history_of_files
 from tankcal.record import record_of, record_of_adjustment, save
-from tankcal.record.comparison import COMPARISON
-from tankcal.record.history import HISTORY
 from tankcal.record.inspection import INSPECTION
 from tankcal.record.plan import WALL_PLAN, plain_of_wall
+from tankcal.record.recalibration import COMPARISON, HISTORY
 from tankcal.record.schema import to_plain
 
 ROOT = Path(__file__).resolve().parent.parent

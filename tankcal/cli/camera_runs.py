@@ -98,7 +98,7 @@ def influence(options):
 
 def check(options):
     """Evaluate differences at check points with a table of limits."""
-    from tankcal.calibration.product import limits
+    from tankcal.calibration.product import check as limits
     from tankcal.calibration.product.check import check_product
     from tankcal.calibration.product.differences import collect_differences, read_differences
     from tankcal.record.camera_analyses import plain_product
@@ -128,7 +128,7 @@ def convert(options):
     """Convert cameras to the form of another program or publication."""
     import numpy as np
 
-    from tankcal.camera.formats.writing import write_camera
+    from tankcal.camera.formats.reading import write_camera
 
     speak(options.language)
     cameras, covariances = _read_cameras(options)
@@ -323,7 +323,7 @@ def _start(options):
 
 def _load_job(source, show, language):
     """Return the job, with its tank if it has one."""
-    from tankcal.terminal.input_language import read_job_language
+    from tankcal.terminal.showing import read_job_language
 
     language = language or read_job_language(source)
     if language is not None:

@@ -92,7 +92,7 @@ def _plan(options):
     from tankcal.planning.improvements import smallest, what_helps
     from tankcal.planning.wall.model import WallPlan
     from tankcal.report import planning as planning_papers
-    from tankcal.terminal.input_language import read_plan_language
+    from tankcal.terminal.showing import read_plan_language
 
     speak(options.language or read_plan_language(options.plan))
     _refuse_idle(options)
@@ -567,7 +567,7 @@ def describe_change(change):
 
 def _network_item(item, name):
     """Return an item of a plan (`planning.changes.ITEMS`) in words."""
-    from tankcal.planning.changes import IMAGES, OF_COURSE, ROW
+    from tankcal.planning.improvements import IMAGES, OF_COURSE, ROW
 
     if item == "photo_station":
         return message("plan_photo_station", "photo station {name}", name=name)

@@ -15,14 +15,17 @@ from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
 from tankcal.geometry.clutter import (
     LEAST_NOISE_M,
+    NO_COLUMN,
     distances_from_axis,
+    find_buckles,
+    find_columns,
     find_form,
     find_rings,
+    find_seams,
     shell_problem,
 )
 from tankcal.geometry.field.blunders import find_blunders, find_uprights
 from tankcal.geometry.field.sites import Sites, spans_of
-from tankcal.geometry.patches import NO_COLUMN, find_buckles, find_columns, find_seams
 from tankcal.messages import message
 
 # Half width of the band about the wall, relative to the nominal radius: at the start and the end.

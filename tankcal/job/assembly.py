@@ -39,7 +39,7 @@ from tankcal.job.structure import structure, to_si
 from tankcal.job.tables import fingerprint, read_beside
 from tankcal.job.tapes import gauged
 from tankcal.messages import message
-from tankcal.tank.rules.model import Rule
+from tankcal.tank.rules import Rule
 
 # Files beside job.toml or the workbook. The geometry package parses the mesh.
 

@@ -25,7 +25,7 @@ from tankcal.job.entries import ColumnValues, kind_of, read_columns, read_regist
 from tankcal.job.fields import is_blank
 from tankcal.job.folder import MAX_SETTINGS_BYTES
 from tankcal.job.folder import read_register as parse_register
-from tankcal.job.model.settings import Equipment, NextVerification, Overruling, Seal
+from tankcal.job.model import Equipment, NextVerification, Overruling, Seal
 from tankcal.job.rule_files import find_rule, tell_layout
 from tankcal.job.tables import (
     REGISTERS,

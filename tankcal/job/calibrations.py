@@ -8,7 +8,7 @@ import numpy as np
 from tankcal.errors import InputError, Problem
 from tankcal.job.cameras import make_camera
 from tankcal.job.checks.survey.cameras import check_calibrations
-from tankcal.job.checks.survey.files import SurveyFiles
+from tankcal.job.checks.survey.readings import SurveyFiles
 from tankcal.job.contract.registers import PARAMETER_KEYS, SECOND_NAMES
 from tankcal.job.entries import read_register
 from tankcal.job.folder import MAX_SETTINGS_BYTES

@@ -7,13 +7,12 @@ import numpy as np
 
 from tankcal.job.contract import KEYS, KINDS, OPEN_SECTIONS, REGISTER_KEYS, columns_of
 from tankcal.job.contract.registers import FAMILIES, SHORT_KEYS
-from tankcal.job.decimals import settle_decimal
-from tankcal.job.field_values import IN_TOML, NEXT_TO_ZERO, read_value
+from tankcal.job.field_values import IN_TOML, NEXT_TO_ZERO, read_value, settle_decimal
 from tankcal.job.fields import Field, Refused, is_blank
 from tankcal.job.tables import nearest, shown
 from tankcal.messages import message
-from tankcal.text.form_words import NO, YES, meant
 from tankcal.text.naming import MAX_NAME, NUMBER
+from tankcal.text.words import NO, YES, meant
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,7 @@
 """Description of one value of a job: a number with bounds, a name, a date, a choice.
 
+Description of one value of a job: a number with bounds, a name, a date, a choice.
+
 A `Field` describes one key of job.toml or one column of a table, and states in words which values
 it accepts. `tankcal.job.field_values` reads the values and raises `Refused` for invalid ones.
 
@@ -10,6 +12,7 @@ built.
 
 import math
 from dataclasses import dataclass
+from math import inf
 
 from tankcal.messages import message
 from tankcal.text.naming import MAX_NAME
@@ -303,3 +306,29 @@ def readings_by_tape(reading_note):
 
 def _number(name, note, low, high, required=False, above_low=False):
     return Field(name, "number", note, required=required, low=low, high=high, above_low=above_low)
+
+
+FREE = "free"  # in place of a standard uncertainty: estimated as an unknown
+
+
+def number(name, note, low=-inf, high=inf, **more):
+    """Return a `Field` for a number from `low` to `high`."""
+    return Field(name, "number", note, low=low, high=high, **more)
+
+
+def positive(name, note, high=inf, **more):
+    """Return a `Field` for a number above 0, at most `high`."""
+    return Field(name, "number", note, low=0, above_low=True, high=high, **more)
+
+
+def choice(name, note, choices, **more):
+    """Return a `Field` for a word of `choices`."""
+    return Field(name, "choice", note, choices=choices, **more)
+
+
+KINDS = ("vertical", "horizontal", "sphere", "mesh")
+VERTICAL = ("vertical",)
+LYING = ("horizontal",)
+STRAPPED = ("vertical", "horizontal")
+LOADED = ("vertical", "sphere")  # kinds whose wall expands under the load of the content
+WITH_POINTS = ("vertical", "horizontal", "sphere")

@@ -13,12 +13,18 @@ from tankcal.job.building import job_of
 from tankcal.job.contract import COLUMNS, KEYS
 from tankcal.job.folder import read_folder, results_given_as_job
 from tankcal.job.model import Job
-from tankcal.job.tables import SETTINGS_FILE, TABLES, WORKBOOK_FILE, Log
+from tankcal.job.tables import (
+    SETTINGS_FILE,
+    TABLES,
+    WORKBOOK_FILE,
+    Log,
+)
 from tankcal.messages import message
 from tankcal.methods.base import methods
-from tankcal.text.form_words import NO, YES, meant
 from tankcal.text.naming import NUMBER
+from tankcal.text.words import NO, YES, meant
 
+# Columns of upright tanks, with the columns that lying tanks have in their place.
 OTHER_WORKBOOKS = (".xls", ".xlsm", ".xlsb", ".xltx", ".ods", ".numbers")
 OF_EVERY_FORM = (("tank", "kind"), ("table", "language"))  # filled in by every starter job
 

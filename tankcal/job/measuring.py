@@ -3,11 +3,10 @@
 import numpy as np
 
 from tankcal.errors import SHEET
-from tankcal.job.cameras import AXES, datum_point, make_camera
+from tankcal.job.cameras import AXES, datum_point, imagery_of, make_camera
 from tankcal.job.checks.survey.readings import bars_of, bars_used, is_bar
 from tankcal.job.contract.observations import ANGLES, READINGS
 from tankcal.job.contract.registers import FREE, INSTRUMENT_KINDS
-from tankcal.job.imagery import imagery_of
 from tankcal.job.structure import angle_in_rad, structure
 from tankcal.survey.measurements import (
     AdjustmentSettings,
@@ -21,8 +20,9 @@ from tankcal.survey.measurements import (
     Readings,
     Setup,
     Targets,
+    distance_of_angle_m,
+    distance_sd_m,
 )
-from tankcal.survey.stadia import distance_of_angle_m, distance_sd_m
 from tankcal.units import ARCSEC
 
 PRINTED = ("certificate", "tension_n")  # keys of instruments that the report shows

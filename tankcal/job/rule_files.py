@@ -9,13 +9,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from tankcal.job.contract.shorthand import choice, positive
 from tankcal.job.entries import read_section
-from tankcal.job.fields import Field, is_blank
+from tankcal.job.fields import Field, choice, is_blank, positive
 from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml
 from tankcal.job.tables import Log, fingerprint, nearest, read_beside, read_bytes
 from tankcal.messages import message
-from tankcal.tank.rules.model import (
+from tankcal.tank.rules import (
     DEVIATION_OF,
     FROM_LEVEL,
     GUARDS,

@@ -489,7 +489,7 @@ class Method:
         """Code of the zero of the heights of the table; None: the dip plate or the bottom."""
 
     def choices(self, result):
-        """Assumptions of the method: {code: value} of `record.choices.Choice`."""
+        """Assumptions of the method: {code: value} of `record.table.Choice`."""
         return {}
 
     def sizes(self, result):

@@ -15,11 +15,15 @@ from tankcal.pipeline.checks.survey import incomplete_certificate, open_question
 from tankcal.pipeline.overruling_effects import effect_of, warn_of_overrulings
 from tankcal.pipeline.result import Result
 from tankcal.pipeline.simulation import SIMULATING, gum_intervals, simulate_table
-from tankcal.pipeline.statements import pairs_to_simulate, statements, verdict_of
 from tankcal.pipeline.surveying import adjust_decided, find_survey, placed
-from tankcal.pipeline.table import check_table, compute_table
-from tankcal.pipeline.tanks import body_of, filled_with
-from tankcal.pipeline.tanks.corrections import corrections_of, gross_at_top
+from tankcal.pipeline.table import (
+    check_table,
+    compute_table,
+    pairs_to_simulate,
+    statements,
+    verdict_of,
+)
+from tankcal.pipeline.tanks import body_of, corrections_of, filled_with, gross_at_top
 from tankcal.tank.capacity import refuse_falling
 from tankcal.tank.dips import proportional_parts
 

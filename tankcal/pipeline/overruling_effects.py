@@ -10,7 +10,7 @@ import numpy as np
 
 from tankcal.errors import HeightError, InputError, Problem, SolutionError
 from tankcal.geometry.field.sites import MOST_SITES
-from tankcal.job.model.settings import Overruling
+from tankcal.job.model import Overruling
 from tankcal.messages import message
 from tankcal.methods.base import supplement_of
 from tankcal.pipeline.surveying import find_survey

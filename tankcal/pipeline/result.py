@@ -13,9 +13,8 @@ from tankcal.job import Job
 from tankcal.messages import message
 from tankcal.pipeline.overruling_effects import Overrulings
 from tankcal.pipeline.simulation import Intervals, TableSimulation
-from tankcal.pipeline.statements import Statements, stated_delivery, stated_volume
-from tankcal.pipeline.tanks import shell_volume
-from tankcal.pipeline.tanks.corrections import Correction
+from tankcal.pipeline.table import Statements, stated_delivery, stated_volume
+from tankcal.pipeline.tanks import Correction, shell_volume
 from tankcal.tank import dips
 from tankcal.tank.body import Body
 from tankcal.tank.budgets import Budget, budget, reading_sources
@@ -35,8 +34,8 @@ if TYPE_CHECKING:
     from tankcal.methods.mesh.ship import ShipTables
     from tankcal.methods.radii.wall import RadiiWall
     from tankcal.methods.strapping.wall import StrappedWall
-    from tankcal.pipeline.liquid.geometry import NominalWall
-    from tankcal.pipeline.liquid.result import LiquidResult
+    from tankcal.pipeline.liquid.body import NominalWall
+    from tankcal.pipeline.liquid.measuring import LiquidResult
     from tankcal.pipeline.read_wall import ReadWall
     from tankcal.pipeline.scanned_solids import Scan
     from tankcal.pipeline.wall.surveyed import Wall

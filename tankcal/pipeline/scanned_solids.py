@@ -39,8 +39,7 @@ from tankcal.messages import message
 from tankcal.pipeline.checks.size import refuse_misfit
 from tankcal.pipeline.checks.survey import noise_is_estimated, origin_of
 from tankcal.pipeline.overruling import decisions_of, refuse_kept
-from tankcal.pipeline.tanks.common import factor_of_unseen
-from tankcal.pipeline.tanks.solid import solid_as_surveyed
+from tankcal.pipeline.tanks.solid import factor_of_unseen, solid_as_surveyed
 from tankcal.pipeline.wall.surveyed import given_covariance
 from tankcal.sections import LEAST_SD_M, coordinates_of
 from tankcal.tank.budgets import Factor, survey_factors

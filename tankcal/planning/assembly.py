@@ -25,11 +25,11 @@ from tankcal.planning.places import (
     bases_of,
     full_turn,
     joints_of,
+    obstacles_of,
     places_around,
     plate_m,
     row_heights_m,
 )
-from tankcal.planning.visibility import obstacles_of
 
 # Defaults of [limits]: largest angle of incidence, degrees, and fewest rays per point.
 INCIDENCE_DEG, RAYS = 70.0, 3

@@ -10,8 +10,7 @@ import numpy as np
 
 from tankcal.geometry.rotations import angles_of
 from tankcal.planning.model import TAPED
-from tankcal.planning.places import readings_of_bases
-from tankcal.planning.visibility import find_measurable
+from tankcal.planning.places import find_measurable, readings_of_bases
 from tankcal.survey import Nominal
 from tankcal.survey.measurements import ImageReadings, KnownPoints, Photo, Readings, Setup, Targets
 from tankcal.survey.observations import KINDS

@@ -9,16 +9,20 @@ from tankcal.job.tables import Log, nearest
 from tankcal.messages import join_with_and, list_some, message
 from tankcal.planning.contract import PLAN_FILE
 from tankcal.planning.model import Box, Pillar
-from tankcal.planning.places import STADIA_FILE, TOUCH_M, base_m, joints_m, plate_m
-from tankcal.planning.visibility import (
+from tankcal.planning.places import (
     GRAZE_M,
+    STADIA_FILE,
+    TOUCH_M,
+    base_m,
     find_hidden,
     find_in_sight,
+    joints_m,
     message_of_cut_line,
     message_of_misplaced_station,
     message_of_obstacle_at,
+    plate_m,
 )
-from tankcal.survey.stadia import distance_of_angle_m
+from tankcal.survey.measurements import distance_of_angle_m
 
 NEAR_M = 0.05  # smallest distance of a station from the wall
 SHOWN = 5  # largest number of lines, rows or obstacles listed in a message

@@ -14,19 +14,19 @@ from tankcal.pipeline.table import check_table
 from tankcal.planning.contract import PLAN_FILE
 from tankcal.planning.measurements import measurements_of, nominal_of
 from tankcal.planning.model import Plan
+from tankcal.planning.places import (
+    Visibility,
+    describe_separate_bodies,
+    find_separate_bodies,
+    find_visible,
+    refuse_blind,
+)
 from tankcal.planning.table import (
     PredictedTable,
     TableResults,
     assess_reliability,
     predict_table,
     refuse_without_delivery,
-)
-from tankcal.planning.visibility import (
-    Visibility,
-    describe_separate_bodies,
-    find_separate_bodies,
-    find_visible,
-    refuse_blind,
 )
 from tankcal.planning.wall.model import WallPlan
 from tankcal.planning.wall.prediction import predict_wall

@@ -14,8 +14,7 @@ from tankcal.job.checking import has_rows, is_not_given, refuse_repeated, tell, 
 from tankcal.job.checks import check_tank
 from tankcal.job.checks.survey.cameras import check_cameras
 from tankcal.job.checks.survey.doubtful import TINY
-from tankcal.job.checks.survey.files import SurveyFiles
-from tankcal.job.checks.survey.readings import bars_of, check_bars, check_instruments
+from tankcal.job.checks.survey.readings import SurveyFiles, bars_of, check_bars, check_instruments
 from tankcal.job.contract import KEYS
 from tankcal.job.entries import (
     ColumnValues,
@@ -67,10 +66,9 @@ from tankcal.planning.contract import (
     check_form,
     no_such_name,
 )
+from tankcal.planning.places import check_obstacles
 from tankcal.planning.position_checks import check_positions
-from tankcal.planning.visibility import check_obstacles
-from tankcal.planning.wall.checks import check_sections
-from tankcal.planning.wall.reading import is_wall_plan, wall_plan_of
+from tankcal.planning.wall.reading import check_sections, is_wall_plan, wall_plan_of
 from tankcal.text.naming import NUMBER
 
 OF_LIQUID = ("horizontal", "sphere")  # kinds of tank that a plan may measure by liquid only

@@ -23,8 +23,7 @@ from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.model import Job
 from tankcal.messages import message
 from tankcal.pipeline.checks.survey import refuse_undetermined
-from tankcal.pipeline.statements import MINIMA_M, statements
-from tankcal.pipeline.table import ComputedTable, compute_table
+from tankcal.pipeline.table import MINIMA_M, ComputedTable, compute_table, statements
 from tankcal.pipeline.tanks.vertical import volume_by_points
 from tankcal.pipeline.wall.finding import find_wall
 from tankcal.pipeline.wall.surveyed import Wall, s_transform

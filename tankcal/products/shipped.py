@@ -48,11 +48,11 @@ class Cameras(Product):
     commands = (("camera", "tankcal.cli.camera"),)
 
     def completions(self):
-        from tankcal.camera.formats.writing import KINDS
+        from tankcal.camera.formats.reading import WRITING_KINDS
 
         return {
-            ("camera convert", "--to"): (KINDS, False),
-            ("camera convert", "--from"): (KINDS, False),
+            ("camera convert", "--to"): (WRITING_KINDS, False),
+            ("camera convert", "--from"): (WRITING_KINDS, False),
         }
 
     def saved_types(self):

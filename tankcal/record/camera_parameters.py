@@ -32,7 +32,7 @@ from typing import Literal
 
 import numpy as np
 
-from tankcal.calibration.edges import Shift
+from tankcal.calibration.interiors import Shift
 from tankcal.calibration.parameters.recommendation import Advice
 from tankcal.camera.model import PARAMETERS, UNITS
 from tankcal.record.camera_versions import CameraFile

@@ -5,8 +5,7 @@ with numbers; the templates supply the sentences.
 """
 
 from tankcal.record.saved_formats import SavedFormat
-from tankcal.record.schema import Finite, Saved, key
-from tankcal.record.texts import WarningRecord
+from tankcal.record.schema import Finite, Saved, WarningRecord, key
 from tankcal.version import find_version
 
 

@@ -1,8 +1,7 @@
 """Intercomparison of software: package, sealed truth, answers and scores."""
 
 from tankcal.record.saved_formats import SavedFormat
-from tankcal.record.schema import Finite, Saved, key
-from tankcal.record.texts import WarningRecord
+from tankcal.record.schema import Finite, Saved, WarningRecord, key
 
 PACKAGE = SavedFormat("tankcal-intercomparison-package", 1, "manifest.json")
 TRUTH = SavedFormat("tankcal-intercomparison-truth", 1, "truth.json")

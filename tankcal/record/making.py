@@ -12,10 +12,12 @@ from math import degrees
 import numpy as np
 import scipy
 
-from tankcal.job.model import Course, Deadwood, InputFile
-from tankcal.job.model.settings import (
+from tankcal.job.model import (
+    Course,
     Datum,
+    Deadwood,
     Equipment,
+    InputFile,
     Inspection,
     Levels,
     Material,
@@ -27,14 +29,14 @@ from tankcal.job.model.settings import (
     Tank,
 )
 from tankcal.methods.base import find_method, given_methods, methods
-from tankcal.pipeline.tanks.corrections import Correction
+from tankcal.pipeline.tanks import Correction
 from tankcal.pipeline.tanks.vertical import nominal_inside_m
 from tankcal.pipeline.wall.shape import wall_shape_of
-from tankcal.record import survey, table, texts
+from tankcal.record import schema, survey, table
 from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
-from tankcal.record.choices import Choice, adjustment_choices, choices_of
 from tankcal.record.long_tables import LongTables
 from tankcal.record.schema import Finite, Saved, fill_from, key, to_plain
+from tankcal.record.table import Choice, adjustment_choices, choices_of
 from tankcal.record.versions import FORMAT
 from tankcal.tank.deliveries import WorstDeliveries
 from tankcal.tank.heads import torispherical_radii
@@ -494,7 +496,7 @@ class Record(Saved, kw_only=True):
     roof: list[Detail] | None = key("the floating roof", default=None)
     budget: list[table.BudgetLine] = key("of the top row, of the table alone", default=())
     choices: list[Choice] = key("all assumptions")
-    warnings: list[texts.WarningRecord] = key("problems that did not stop the job")
+    warnings: list[schema.WarningRecord] = key("problems that did not stop the job")
     adjustment: AdjustmentRecord | None = key("null: points were supplied", default=None)
     budgets: list[table.StatedBudget] = key("stated volumes, then deliveries", default=())
     limits: list[table.LimitOfTank] | None = key(
@@ -554,7 +556,7 @@ def record_of(result):
             roof=roof_of(result),
             budget=table.budget_of(result),
             choices=choices_of(result),
-            warnings=texts.warnings_of(result.warnings),
+            warnings=schema.warnings_of(result.warnings),
             adjustment=adjustment and adjustment_of(adjustment, job.measurements),
             budgets=table.budgets_of(result),
             limits=result.stated.limits or None,
@@ -580,7 +582,7 @@ def record_of_adjustment(job, adjustment):
             points=survey.points_of_adjustment(adjustment),
             overrulings=survey.overrulings_of_adjustment(job),
             choices=adjustment_choices(adjustment, measurements),
-            warnings=texts.warnings_of(dict.fromkeys((*job.warnings, *adjustment.warnings))),
+            warnings=schema.warnings_of(dict.fromkeys((*job.warnings, *adjustment.warnings))),
             adjustment=adjustment_of(adjustment, measurements),
         )
     )

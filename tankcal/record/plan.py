@@ -12,8 +12,7 @@ from tankcal.planning.wall.changes import wall_count
 from tankcal.planning.wall.filling import FillingOutlook
 from tankcal.planning.wall.prediction import CourseOutlook, ReadingsOutlook
 from tankcal.record.saved_formats import SavedFormat
-from tankcal.record.schema import Saved, fill_from, key, to_plain
-from tankcal.record.texts import WarningRecord, warnings_of
+from tankcal.record.schema import Saved, WarningRecord, fill_from, key, to_plain, warnings_of
 
 PLAN = SavedFormat("tankcal-plan", 1, "plan.json")  # so far one version
 

@@ -1,4 +1,6 @@
-"""Saved data, declared once as dataclasses: JSON schema, conversion to plain data, and reading.
+"""Saved data, declared once as dataclasses: JSON schema, conversion to plain data, texts.
+
+Saved data, declared once as dataclasses: JSON schema, conversion to plain data, and reading.
 
 A dataclass is a JSON object. Its fields are the keys, in their order, with the unit in the name. A
 float may be null, since NaN and infinity are written as null; other values are null only if their
@@ -553,3 +555,35 @@ def _convert_object(cls, data):
         if declared.name not in values and not _has_default(declared):
             values[declared.name] = None
     return cls(**values)
+
+
+class Text(Saved):
+    """A text in English, with its code and the values in it."""
+
+    text: str = key("in English")
+    code: str | None = key("of its translation; null: none")
+    values: dict = key("of the placeholders: numbers, texts, lists of these, and texts with a code")
+
+
+class WarningRecord(Saved):
+    """A problem that did not stop the job."""
+
+    file: str = key("name")
+    row: int | None = key("of the file")
+    column: str | None = key("of the file, or key")
+    text: str = key("in English")
+    code: str | None = key("of its translation; null: none")
+    values: dict = key("of the placeholders: numbers, texts, lists of these, and texts with a code")
+
+
+def text_of(message):
+    """Return the `Text` of a Message or of any text."""
+    return Text(str(message), **as_plain(message))
+
+
+def warnings_of(problems):
+    """Return the `WarningRecord` of each `errors.Problem`."""
+    return [
+        fill_from(WarningRecord, problem, text=str(problem.expected), **as_plain(problem.expected))
+        for problem in problems
+    ]

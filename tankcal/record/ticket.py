@@ -7,8 +7,7 @@ record of the capacity table.
 import tankcal
 from tankcal.messages import Message
 from tankcal.record.saved_formats import SavedFormat
-from tankcal.record.schema import Finite, Saved, key
-from tankcal.record.texts import WarningRecord
+from tankcal.record.schema import Finite, Saved, WarningRecord, key
 
 TICKET = SavedFormat("tankcal-ticket", 1, "ticket.json")
 

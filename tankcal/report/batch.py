@@ -47,7 +47,7 @@ def summary_files(summary, language, folder):
     -------
     list of str
     """
-    from tankcal.report.outputs.csv_files import write_table
+    from tankcal.report.outputs import write_table
     from tankcal.report.web import page
 
     text = json.dumps(summary, ensure_ascii=False, allow_nan=False, indent=1)

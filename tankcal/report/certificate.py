@@ -10,7 +10,7 @@ from tankcal.job.certificate_entries import missing_entries
 from tankcal.job.plausibility_table import CODES
 from tankcal.methods.base import methods
 from tankcal.report import blocks
-from tankcal.report.scope import find_capability, is_outside_scope
+from tankcal.report.laboratory import find_capability, is_outside_scope
 from tankcal.report.tables.facts import (
     CERTIFICATE,
     REFERENCES,

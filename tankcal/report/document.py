@@ -4,7 +4,7 @@ import base64
 
 from tankcal.errors import TankcalError
 from tankcal.report import blocks
-from tankcal.report.letterhead import data_problem
+from tankcal.report.laboratory import data_problem
 from tankcal.report.markdown import nodes
 
 PARTS = ("certificate", "working-papers", "field-table")

@@ -15,9 +15,8 @@ from tankcal.job.certificate_entries import IN_LETTERHEAD
 from tankcal.record import load
 from tankcal.record.columns import as_columns
 from tankcal.report import attachments, blocks
-from tankcal.report.letterhead import read_saved
+from tankcal.report.laboratory import letterhead_in_scope, read_saved
 from tankcal.report.plain import Column, PlainPaper
-from tankcal.report.scope import letterhead_in_scope
 from tankcal.report.uncertainty.stated import stated_U_m3
 from tankcal.text.words import (
     choice_sentence,

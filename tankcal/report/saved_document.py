@@ -143,7 +143,7 @@ class SavedDocument:
         return [path for path in (Path(folder) / name for name in self.files) if path.exists()]
 
     def _write_files(self, paper, folder, progress):
-        from tankcal.report.outputs.csv_files import write_table
+        from tankcal.report.outputs import write_table
         from tankcal.report.pdf import pdf
         from tankcal.report.web import page
 

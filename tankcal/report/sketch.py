@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyBboxPatch, Rectangle
 
-from tankcal.report.dip_point import dip_point
 from tankcal.report.plots.style import GREY, INK, PALE, RED, WIDTH, styled
+from tankcal.report.tables.facts import dip_point
 
 _LEFT, _RIGHT = 2.0, 4.0  # sides of the tank on the page
 _BOTTOM = 0.5  # bottom of the tank on the page

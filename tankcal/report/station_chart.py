@@ -17,8 +17,7 @@ from tankcal.record.manifest import digest_of
 from tankcal.report import blocks
 from tankcal.report.folders import replace_file
 from tankcal.report.plain import PlainPaper
-from tankcal.report.uncertainty.sources import critical_zone
-from tankcal.report.uncertainty.stated import k_of_rows, stated_U_m3
+from tankcal.report.uncertainty.stated import critical_zone, k_of_rows, stated_U_m3
 from tankcal.text.digits import NOTHING, fixed, format_significant, shortest
 from tankcal.text.words import language_of, load_words
 

@@ -22,7 +22,7 @@ from tankcal.job.tables import COVARIANCE_FILE
 from tankcal.messages import message
 from tankcal.record import long_tables
 from tankcal.record import manifest as manifests
-from tankcal.report.letterhead import (
+from tankcal.report.laboratory import (
     CMC,
     LETTERHEAD_FILE,
     PLACE,
@@ -316,7 +316,7 @@ def _compare_covariance(verification, path, adjustment):
     import numpy as np
 
     from tankcal.record.recomputation import TOLERANCE
-    from tankcal.report.outputs.csv_files import write_covariance
+    from tankcal.report.outputs import write_covariance
 
     with tempfile.TemporaryDirectory(prefix="tankcal-") as place:
         write_covariance(adjustment, Path(place))

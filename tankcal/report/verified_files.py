@@ -14,9 +14,9 @@ import tankcal
 from tankcal.errors import InputError, Problem, TankcalError
 from tankcal.messages import message
 from tankcal.record.manifest import digest_of
-from tankcal.report import dcc
+from tankcal.report import dcc, outputs
 from tankcal.report.attachments import sha256
-from tankcal.report.outputs import RECORD, csv_files
+from tankcal.report.outputs import RECORD
 from tankcal.report.workbook.book import RECORD_PROPERTY
 
 INPUT_CODES = ("verify_input_missing", "verify_input_changed")
@@ -242,11 +242,11 @@ def compare_tables(verification, folder, record):
     if record["tankcal"] != tankcal.__version__:
         return  # another version may write another format
     present = [
-        name for name in csv_files.FILES if name.endswith(".csv") and (folder / name).is_file()
+        name for name in outputs.CSV_FILES if name.endswith(".csv") and (folder / name).is_file()
     ]
     with tempfile.TemporaryDirectory(prefix="tankcal-") as again:
         try:
-            csv_files.write_tables(record, Path(again))
+            outputs.write_tables(record, Path(again))
         except (LookupError, TypeError, ValueError, AttributeError):
             text = message("verify_no_tables", "does not have the content of a record")
             raise InputError(Problem(RECORD, text)) from None

@@ -9,12 +9,12 @@ _MODULE_OF = {
     "Adjustment": "results",
     "Cause": "results",
     "Dependence": "results",
-    "Nominal": "prediction",
-    "Predicted": "prediction",
+    "Nominal": "adjustment",
+    "Predicted": "adjustment",
     "Reading": "results",
     "adjust_survey": "adjustment",
     "datum_dependence": "results",
-    "predict_survey": "prediction",
+    "predict_survey": "adjustment",
     "wall_points": "points",
 }
 

@@ -1,23 +1,24 @@
-"""Adjustment of a survey: from the measurements as read to points with their covariance.
+"""Adjustment of a survey, and prediction of the covariance of a planned survey.
+
+Adjustment of a survey: from the measurements as read to points with their covariance.
 
 Correction of image points for the depth of their objects: an outer iteration of the adjustment.
 
 Adjusted points and photos give the depth of each image point, and the depth gives the distortion
-there (tankcal.camera.focus). The image points are corrected to the plane of focus and adjusted
+there (tankcal.camera.model). The image points are corrected to the plane of focus and adjusted
 again until the correction no longer changes.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from tankcal.adjust import CRITICAL
-from tankcal.camera.focus import refer_to_focus
-from tankcal.camera.model import PARAMETERS, UNITS
+from tankcal.camera.model import PARAMETERS, UNITS, refer_to_focus
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
-from tankcal.survey.datum import make_frame
+from tankcal.survey.datum import Frame, make_frame
 from tankcal.survey.diagnosis.blunders import (
     SOME,
     count_set_aside,
@@ -34,18 +35,19 @@ from tankcal.survey.diagnosis.checks import (
     find_disagreeing_checks,
     scale_of_control,
 )
-from tankcal.survey.diagnosis.diagnoses import MIRROR, diagnose
-from tankcal.survey.diagnosis.double_names import names_alike, same_place
-from tankcal.survey.diagnosis.fixed_datum_check import (
+from tankcal.survey.diagnosis.diagnoses import MIRROR, diagnose, names_alike, same_place
+from tankcal.survey.diagnosis.misread_files import (
     find_strained_control,
+    likely_mistake,
+    photos_that_do_not_fit,
     wrong_control,
     wrongly_held,
 )
-from tankcal.survey.diagnosis.misread_files import likely_mistake, photos_that_do_not_fit
+from tankcal.survey.network import Adjusted, predict
 from tankcal.survey.network.adjustment import find_hardly_determined
 from tankcal.survey.network.reliability import HELD, UNCONTROLLED, reactions
 from tankcal.survey.network.survey import IMAGES
-from tankcal.survey.network_of_survey import find_point_row, gather, held_trace
+from tankcal.survey.network_of_survey import GatheredSurvey, find_point_row, gather, held_trace
 from tankcal.survey.observations import NUISANCES
 from tankcal.survey.results import (
     Adjustment,
@@ -56,7 +58,12 @@ from tankcal.survey.results import (
     causes_of,
 )
 from tankcal.survey.start.single_points import SeveralPlacesError
-from tankcal.survey.start_values import add_start_values, mirrored_targets, start_like
+from tankcal.survey.start_values import (
+    add_start_values,
+    finish_start_values,
+    mirrored_targets,
+    start_like,
+)
 
 SUSPICIOUS = 4.0  # sigma0 above which whole files are suspected
 SEVERAL = 0.05  # share of rejected values above which whole files are suspected
@@ -635,3 +642,94 @@ def _group(kind, name, unit, parts, survey):
         kind, name, unit, len(residual), count - len(residual), redundancy, factor, factor_sd,
         rms, low, high,
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """Planned positions.
+
+    Attributes
+    ----------
+    points : dict
+        {name: (3,) coordinates, m}, including the set-ups.
+    photos : dict
+        {name: ((3,) projection centre, m, (3, 3) rotation)}.
+    """
+
+    points: dict
+    photos: dict
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """Prediction of a survey.
+
+    Attributes
+    ----------
+    adjusted : Adjusted
+        network.Adjusted at the nominal values; its residuals and sigma0 have no meaning.
+    gathered : GatheredSurvey
+        Its `aside` lists points that cannot be determined.
+    frame : Frame
+        Datum of the survey.
+    """
+
+    adjusted: Adjusted
+    gathered: GatheredSurvey
+    frame: Frame
+
+
+def predict_survey(measurements, nominal):
+    """Predict the adjustment of a planned survey; observed values are ignored.
+
+    Parameters
+    ----------
+    measurements : Measurements
+    nominal : Nominal
+        Planned positions.
+
+    Returns
+    -------
+    Predicted
+
+    Raises
+    ------
+    InputError
+        If a point or photo has no nominal position.
+    SolutionError
+        If the survey does not determine the unknowns.
+    """
+    gathered = gather(measurements)
+    if not gathered.survey.points:
+        raise InputError(
+            Problem(
+                "plan.toml", message("no_observations_planned", "the survey has no observations")
+            )
+        )
+    survey = finish_start_values(place_at_nominal(gathered.survey, nominal), gathered, measurements)
+    frame = make_frame(survey, gathered, measurements.settings)
+    return Predicted(predict(frame.survey, **frame.options), gathered, frame)
+
+
+def place_at_nominal(survey, nominal):
+    """Return a network survey with nominal values as start values."""
+    photos = survey.photos
+    missing = [name for name in survey.points if name not in nominal.points]
+    missing += [
+        name_of_photo
+        for name_of_photo in (photos.names if photos else ())
+        if name_of_photo not in nominal.photos
+    ]
+    if missing:
+        expected = f"no nominal place is known of {', '.join(missing[:5])}"
+        raise InputError(Problem("plan.toml", expected))
+    xyz = np.array([nominal.points[name] for name in survey.points], dtype=float)
+    changes = {"xyz_m": xyz, "sets": np.zeros(len(survey.sets))}
+    if photos is not None:
+        places = [nominal.photos[name] for name in photos.names]
+        changes["photos"] = replace(
+            photos,
+            xyz_m=np.array([xyz for xyz, _ in places], dtype=float),
+            rotation=np.array([rotation for _, rotation in places], dtype=float),
+        )
+    return replace(survey, **changes)

@@ -17,7 +17,6 @@ from tankcal.messages import message
 from tankcal.survey.network.snooping import start_from_adjusted as started_from
 from tankcal.survey.observations import ControlCoordinates, Distances, SystemCoordinates
 from tankcal.survey.readings import bend_per_m
-from tankcal.survey.start.clues import Clues, grow_piece
 from tankcal.survey.start.loose_frames import join_local_frames
 from tankcal.survey.start.photographs import (
     SURE,
@@ -28,10 +27,17 @@ from tankcal.survey.start.photographs import (
     image_errors,
     sights_of,
 )
-from tankcal.survey.start.pieces import BAD_JOINT, certain_places, hinted_places, joint, similarity
-from tankcal.survey.start.plan import medians, plan_of
+from tankcal.survey.start.pieces import (
+    BAD_JOINT,
+    Clues,
+    certain_places,
+    grow_piece,
+    hinted_places,
+    joint,
+    similarity,
+)
 from tankcal.survey.start.plan_frames import find_plan_positions
-from tankcal.survey.start.polar import orient_circles
+from tankcal.survey.start.polar import medians, orient_circles, plan_of
 from tankcal.survey.start.single_points import (
     LISTED,
     loose_frame_sentence,

@@ -36,7 +36,7 @@ def read_letterhead(options):
     """Return the checked letterhead of the options, or None."""
     if options.letterhead is None:
         return None
-    from tankcal.report.letterhead import load
+    from tankcal.report.laboratory import load
 
     return load(options.letterhead)
 

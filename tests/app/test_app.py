@@ -14,7 +14,7 @@ from starlette.testclient import TestClient
 
 from tankcal.cli import main
 from tankcal.products.app import serving
-from tankcal.products.app.guard import new_token
+from tankcal.products.app.access import new_token
 from tankcal.products.app.server import DOCUMENTS, EXAMPLES, SURVEYS
 from tankcal.products.app.site import Site, identifier
 from tankcal.text.words import load_words

@@ -18,7 +18,7 @@ import pytest
 from background import heed_ctrl_c
 from browser import THIS_MACHINE, Browser
 
-from tankcal.products.desk import review
+from tankcal.products.desk import jobs
 from tankcal.products.register.certificates import read_certificates
 from tankcal.text.words import load_words
 
@@ -395,7 +395,7 @@ def test_a_reviewer_returns_approves_and_issues(folder, keys, language, state):
     assert number in browser.text("#certificates")
     certificate = read_certificates(state / "workspace" / "register.csv")[number]
     assert (certificate.state, certificate.approved_by) == ("issued", "Rui Braga")
-    assert [event.act for event in review.read_events(folder)].count("returned") == 1
+    assert [event.act for event in jobs.read_events(folder)].count("returned") == 1
     # the list of the laboratory, with its states
     keys.follow(".brand")
     expected = words["states"]["issued"].format(number=number)

@@ -11,16 +11,13 @@ from job_builder import write_job, write_workbook
 from starlette.testclient import TestClient
 
 from tankcal.errors import InputError
-from tankcal.products.app import people, serving
-from tankcal.products.app.people import ROLES, People, add_user
+from tankcal.products.app import access, serving
+from tankcal.products.app.access import ROLES, People, add_user
 from tankcal.products.app.review_pages import find_signature
 from tankcal.products.app.site import Site
-from tankcal.products.desk import locks, review
+from tankcal.products.desk import jobs
 from tankcal.products.desk.draft import Draft
-from tankcal.products.desk.jobs import RecentJobs
-from tankcal.products.desk.locks import JobLock, new_owner
-from tankcal.products.desk.review import Act
-from tankcal.products.desk.states import State, state_of
+from tankcal.products.desk.jobs import Act, JobLock, RecentJobs, State, new_owner, state_of
 from tankcal.products.register.certificates import read_certificates
 from tankcal.text.words import load_words
 
@@ -79,7 +76,7 @@ def test_decisions_follow_each_other_and_belong_to_a_record(folder):
     draft, sha = Draft.open(folder), write_record(folder)
 
     def add(decision, **rest):
-        review.add_event(draft, decision, "Ana", sha, **rest)
+        jobs.add_event(draft, decision, "Ana", sha, **rest)
 
     for early in (Act.APPROVED, Act.RETURNED, Act.REVIEWED, Act.REVISED):
         with pytest.raises(InputError):
@@ -94,12 +91,12 @@ def test_decisions_follow_each_other_and_belong_to_a_record(folder):
     add(Act.APPROVED)
     with pytest.raises(InputError):
         add(Act.SUBMITTED)
-    events = review.read_events(folder)
+    events = jobs.read_events(folder)
     assert [event.act for event in events][-1] is Act.APPROVED
     assert events[1].text == 'point 17 is a "manhole"\\ é'
     assert (state_of(folder).state, state_of(folder).person) == (State.APPROVED, "Ana")
     # Other results, or changed data: the approval does not hold.
-    assert review.find_decision(events, "0" * 64) is None
+    assert jobs.find_decision(events, "0" * 64) is None
     write_record(folder, "2")
     assert state_of(folder).state is State.COMPUTED
     write_record(folder)
@@ -113,11 +110,11 @@ def test_decisions_follow_each_other_and_belong_to_a_record(folder):
 ])  # fmt: skip
 def test_a_damaged_review_is_reported_and_approves_nothing(folder, content):
     write_record(folder)
-    path = review.folder_of(folder) / review.FILE
+    path = jobs.folder_of(folder) / jobs.FILE
     path.parent.mkdir()
     path.write_bytes(content.encode("utf-8", "surrogateescape"))
     with pytest.raises(InputError):
-        review.read_events(folder)
+        jobs.read_events(folder)
     assert state_of(folder).state is State.COMPUTED
 
 
@@ -128,30 +125,30 @@ def test_changes_since_a_copy_are_listed_by_cell(tmp_path, is_book):
     else:
         source = write_job(tmp_path / "job", rings=2)
     draft = Draft.open(source)
-    review.add_event(draft, Act.SUBMITTED, "Ana", "a" * 64)
-    copy, path = review.find_copy(source, review.read_events(source), "b" * 64)
-    assert review.list_changes(path, draft) == []
+    jobs.add_event(draft, Act.SUBMITTED, "Ana", "a" * 64)
+    copy, path = jobs.find_copy(source, jobs.read_events(source), "b" * 64)
+    assert jobs.list_changes(path, draft) == []
     before = draft.tables["points"].rows
     draft.set_cells("points", [(3, "z_m", "0.97")])
     draft.remove_rows("points", [5])
     draft.set_value("job", "tank", "owner", "Porto")
-    changes = review.list_changes(path, draft)
+    changes = jobs.list_changes(path, draft)
     cell = before[3].cells[draft.tables["points"].headings.index("z_m")]
     assert (copy.name, len(changes)) == ("Ana", 3)
-    assert review.Change("job", "tank", "owner", None, "Porto") in changes
-    assert review.Change("points", 4, "z_m", cell, "0.97") in changes
+    assert jobs.Change("job", "tank", "owner", None, "Porto") in changes
+    assert jobs.Change("points", 4, "z_m", cell, "0.97") in changes
     assert [item.row for item in changes if item.after is None] == [6]
     # The copy of the own record is no earlier copy; an approved copy has precedence.
-    assert review.find_copy(source, review.read_events(source), "a" * 64) == (None, None)
+    assert jobs.find_copy(source, jobs.read_events(source), "a" * 64) == (None, None)
 
 
 def test_remarks_are_resolved_once(folder):
     draft, sha = Draft.open(folder), write_record(folder)
-    review.add_event(draft, Act.REMARK, "Rui", sha, "manhole?", "points.csv, 17")
-    review.add_event(draft, Act.RESOLVED, "Ana", sha, "yes", number=1)
+    jobs.add_event(draft, Act.REMARK, "Rui", sha, "manhole?", "points.csv, 17")
+    jobs.add_event(draft, Act.RESOLVED, "Ana", sha, "yes", number=1)
     with pytest.raises(InputError):
-        review.add_event(draft, Act.RESOLVED, "Ana", sha, "again", number=1)
-    [(remark, resolved)] = review.list_remarks(review.read_events(folder))
+        jobs.add_event(draft, Act.RESOLVED, "Ana", sha, "again", number=1)
+    [(remark, resolved)] = jobs.list_remarks(jobs.read_events(folder))
     assert (remark.place, resolved.text) == ("points.csv, 17", "yes")
 
 
@@ -171,7 +168,7 @@ def test_who_submitted_approves_only_with_a_reason(client, site, folder, monkeyp
     answer = decide("approved", " Ana Lima ", " ")
     assert answer.status_code == 409
     assert "Ana Lima enviou estes resultados" in answer.text
-    assert review.find_decision(review.read_events(folder), sha).act is Act.SUBMITTED
+    assert jobs.find_decision(jobs.read_events(folder), sha).act is Act.SUBMITTED
     assert decide("approved", "Ana Lima", "works alone").status_code == 303
     assert decide("revised", "Rui", "again").status_code == 303
     assert decide("submitted", "Ana Lima").status_code == 303
@@ -239,7 +236,7 @@ def test_a_signature_covers_the_file_or_not(tmp_path):
 @pytest.fixture
 def staff(tmp_path, monkeypatch):
     """An app behind TLS with a user of each role."""
-    monkeypatch.setattr(people, "COST", {"n": 4, "r": 1, "p": 1})
+    monkeypatch.setattr(access, "COST", {"n": 4, "r": 1, "p": 1})
     path = tmp_path / "users.toml"
     for role in ROLES:
         add_user(path, f"{role} Ã", [role], SECRET)
@@ -292,7 +289,7 @@ def test_a_session_begins_and_ends(staff, monkeypatch):
     os.utime(path, ns=(1, 1))
     assert client.get("/").status_code == 303
     log_in(client, "reviewer Ã")
-    monkeypatch.setattr(people, "IDLE_S", -1)
+    monkeypatch.setattr(access, "IDLE_S", -1)
     assert client.get("/").status_code == 303
 
 
@@ -302,7 +299,7 @@ def test_passwords_are_hashed_and_attempts_limited(staff):
     assert SECRET not in text
     assert path.stat().st_mode & 0o777 == 0o600
     assert len(set(re.findall(r"scrypt\$\w+", text))) == len(ROLES)  # a salt each
-    for _ in range(people.MOST_OF_BOTH):
+    for _ in range(access.MOST_OF_BOTH):
         assert log_in(client, "viewer Ã", "wrong").status_code == 403
     assert log_in(client, "viewer Ã").status_code == 429
     assert log_in(client, "approver Ã").status_code == 303
@@ -314,7 +311,7 @@ def test_passwords_are_hashed_and_attempts_limited(staff):
 def test_roles_decide_about_every_change(staff, folder, role):
     client, site, _ = staff
     key, sha = site.add(folder), write_record(folder)
-    review.add_event(Draft.open(folder), Act.SUBMITTED, "Ana", sha)
+    jobs.add_event(Draft.open(folder), Act.SUBMITTED, "Ana", sha)
     log_in(client, f"{role} Ã")
     edit, run, approve = ("edit" in ROLES[role], "run" in ROLES[role], "approve" in ROLES[role])
     table = {
@@ -340,7 +337,7 @@ def test_roles_decide_about_every_change(staff, folder, role):
     answer = post(client, f"/job/{key}/review", act="approved", name="X", text="ok", record=sha)
     assert (answer.status_code == 303) == approve
     if approve:
-        assert review.read_events(folder)[-1].name == f"{role} Ã"
+        assert jobs.read_events(folder)[-1].name == f"{role} Ã"
         lines = [json.loads(line) for line in site.log.path.read_text().splitlines()]
         assert lines[-1]["name"] == f"{role} Ã"
         assert lines[-1]["content"]["act"] == "approved"
@@ -364,7 +361,7 @@ def test_a_server_for_other_machines_needs_tls_and_users(monkeypatch, capsys, tm
 
     monkeypatch.setenv("TANKCAL_STATE", str(tmp_path))
     monkeypatch.setattr(serving, "serve", lambda *given: pytest.fail("served"))
-    monkeypatch.setattr(people, "COST", {"n": 4, "r": 1, "p": 1})
+    monkeypatch.setattr(access, "COST", {"n": 4, "r": 1, "p": 1})
     assert main(["app", "--address", "0.0.0.0"]) == 2
     assert "--certificate" in capsys.readouterr().err
     for arguments in (["--behind-tls", "lab.example"],
@@ -402,10 +399,10 @@ def test_a_second_server_shows_and_takes_over(client, site, folder, tmp_path, mo
         assert post(second, f"/job/{key}/run").status_code == 409
         post(second, f"/job/{key}/take-over")  # not yet: the first is alive
         assert act(second, key, "points", enter).status_code == 409
-        monkeypatch.setattr(locks, "SILENT_S", -1)
+        monkeypatch.setattr(jobs, "SILENT_S", -1)
         assert load_words("es")["app"]["take_over"] in second.get(f"/job/{key}/").text
         post(second, f"/job/{key}/take-over")
-        monkeypatch.setattr(locks, "SILENT_S", 300)
+        monkeypatch.setattr(jobs, "SILENT_S", 300)
         assert act(second, key, "points", enter).status_code == 200
         # The first notices it before its next entry.
         answer = act(client, key, "points", enter)
@@ -471,7 +468,7 @@ def example(tmp_path_factory):
 
 @pytest.mark.slow
 def test_a_certificate_is_issued_withdrawn_and_replaced(client, site, example):
-    key, sha = site.add(example), review.record_digest(example / "results")
+    key, sha = site.add(example), jobs.record_digest(example / "results")
     page = client.get(f"/job/{key}/review").text
     assert WORDS["review"]["assessment"] in page
     assert post(client, f"/job/{key}/issue", record=sha).status_code == 403  # not approved

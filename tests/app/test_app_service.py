@@ -15,7 +15,7 @@ from test_app import ORIGIN, client, site  # noqa: F401
 from test_app_in_browser import AXE, SLOW_S, ended, follow, start
 
 from tankcal import cli
-from tankcal.products.app.service_pages import list_services
+from tankcal.products.app.office_pages import list_services
 from tankcal.products.quantity.table import read_table
 from tankcal.text.words import load_words
 

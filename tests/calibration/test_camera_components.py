@@ -6,8 +6,8 @@ import json
 import numpy as np
 import pytest
 
+from tankcal.calibration.parameters.judgement import components, drop_parameters
 from tankcal.calibration.parameters.recommendation import silva_rule
-from tankcal.calibration.parameters.significance import components, drop_parameters
 
 # the labels printed with the tables are one place off from the fourth on; this is the true order
 NAMES = ("c", "x0", "y0", "A", "K1", "K2", "K3", "P1", "P2", "B")

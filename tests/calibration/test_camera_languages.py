@@ -11,7 +11,7 @@ from camera_sets import sets
 from invented_language import bracketed, without_brackets
 from paper_cells import blocks_of_cells
 
-from tankcal.calibration.product.limits import read_limits, shipped_limits
+from tankcal.calibration.product.check import read_limits, shipped_limits
 from tankcal.calibration.stability.comparison import compare
 from tankcal.errors import TankcalError
 from tankcal.record import camera_analyses as stability_json

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from camera_sets import HOSTILE, SMALL, Q, sets
 
-from tankcal.calibration.edges import decentring_profile, radial_curve
-from tankcal.calibration.product.check import check_product
-from tankcal.calibration.product.limits import shipped_limits
+from tankcal.calibration.interiors import decentring_profile, radial_curve
+from tankcal.calibration.product.check import check_product, shipped_limits
 from tankcal.calibration.stability.comparison import compare
 from tankcal.camera.model import Form, distort_image_points
 from tankcal.errors import InputError

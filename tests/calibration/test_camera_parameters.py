@@ -12,8 +12,7 @@ from scipy import stats
 from surveyed import by_photographs
 
 import tankcal
-from tankcal.calibration.edges import Frame, left_shifts, own_shift
-from tankcal.calibration.interiors import collect_interiors
+from tankcal.calibration.interiors import Frame, collect_interiors, left_shifts, own_shift
 from tankcal.calibration.parameters.analysis import (
     Dropping,
     analyse_job,
@@ -21,9 +20,8 @@ from tankcal.calibration.parameters.analysis import (
     compare_points,
     read_interior_after,
 )
-from tankcal.calibration.parameters.judgement import Choices
-from tankcal.calibration.parameters.recommendation import Evidence, Limit, pessoa_rule, recommend
-from tankcal.calibration.parameters.significance import (
+from tankcal.calibration.parameters.judgement import (
+    Choices,
     ZeroTest,
     compute_f,
     critical_f,
@@ -31,6 +29,7 @@ from tankcal.calibration.parameters.significance import (
     group_tests,
     single_tests,
 )
+from tankcal.calibration.parameters.recommendation import Evidence, Limit, pessoa_rule, recommend
 from tankcal.camera.model import PARAMETERS, Form
 from tankcal.errors import InputError
 from tankcal.record import record_of, record_of_adjustment

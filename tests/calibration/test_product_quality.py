@@ -9,9 +9,16 @@ import pytest
 from draws import draws
 from scipy import stats
 
-from tankcal.calibration.product.check import check_product, chi2_limit, t_limit
+from tankcal.calibration.product.check import (
+    Limit,
+    LimitTable,
+    check_product,
+    chi2_limit,
+    read_limits,
+    shipped_limits,
+    t_limit,
+)
 from tankcal.calibration.product.differences import collect_differences, read_differences
-from tankcal.calibration.product.limits import Limit, LimitTable, read_limits, shipped_limits
 from tankcal.errors import InputError
 from tankcal.record.camera_analyses import plain_product
 from tankcal.record.camera_versions import FORMAT

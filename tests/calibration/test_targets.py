@@ -22,7 +22,7 @@ from tankcal.calibration.targets.coded import _Model
 from tankcal.calibration.targets.results import Marker
 
 cv2 = pytest.importorskip("cv2", reason="no OpenCV here: pip install 'tankcal[images]'")
-from tankcal.calibration.targets.pictures import load_dictionary, target_image  # noqa: E402
+from tankcal.calibration.targets.results import load_dictionary, target_image  # noqa: E402
 
 ARUCO, APRILTAG = "DICT_4X4_50", "DICT_APRILTAG_36H11"
 DISC = ((-1, -1), (1, -1), (1, 1), (-1, 1))

@@ -13,7 +13,7 @@ from tankcal.camera.model import Form, correct_image_points, distort_image_point
 from tankcal.geometry.rotations import rotation_of_view
 
 cv2 = pytest.importorskip("cv2", reason="no OpenCV here: pip install 'tankcal[images]'")
-from tankcal.calibration.targets.pictures import load_dictionary  # noqa: E402
+from tankcal.calibration.targets.results import load_dictionary  # noqa: E402
 
 SIZE, PIXEL_MM, SIDE_M = np.array([1000, 800]), 0.005, 0.3
 INTERIOR = np.array([5.02, 0.03, -0.02, -2.5e-3, 4e-5, 0, 0, 2e-4, -1e-4, 0, 0, 0, 0])

@@ -7,11 +7,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tankcal.camera.formats import reading, writing
+from tankcal.camera.formats import reading
+from tankcal.camera.formats import reading as writing
 from tankcal.camera.formats.frame import frame_points, make_framed_camera, project_rays, trace_rays
-from tankcal.camera.formats.reading import parse_cameras, read_camera
+from tankcal.camera.formats.reading import (
+    cameras_toml_entry,
+    make_sd_key,
+    parse_cameras,
+    read_camera,
+    write_camera,
+)
 from tankcal.camera.formats.texts import LONGEST
-from tankcal.camera.formats.writing import cameras_toml_entry, make_sd_key, write_camera
 from tankcal.camera.model import KEYS, PARAMETERS, Form
 from tankcal.errors import InputError
 from tankcal.job.calibrations import read_cameras
@@ -84,7 +90,7 @@ def problems_of(text, **arguments):
     return caught.value.problems
 
 
-@pytest.mark.parametrize("kind", writing.KINDS[1:])
+@pytest.mark.parametrize("kind", writing.WRITING_KINDS[1:])
 def test_written_file_is_read_back(kind, figure):
     """Property: 46 x 35 points of the frame within 1e-9 px, the kind recognised."""
     written = write_camera(kind, [("7", CAMERA)], radius_mm=6.0)
@@ -450,4 +456,4 @@ def test_damaged_file_is_read_or_reported(kind, cuts):
 
 
 def test_kinds_have_the_same_names_everywhere():
-    assert {*reading.KINDS, "cameras.toml"} == set(writing.KINDS)
+    assert {*reading.KINDS, "cameras.toml"} == set(writing.WRITING_KINDS)

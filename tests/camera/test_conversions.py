@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tankcal.camera.formats import balanced, colmap, metashape, pix4d
+from tankcal.camera.formats import balanced, opencv, photogrammetry
 from tankcal.camera.formats.frame import frame_points, make_framed_camera, project_rays, trace_rays
 from tankcal.camera.formats.opencv import (
     OpenCV,
@@ -102,25 +102,25 @@ def test_opencv_projects_the_same(count, figure):
 
 @pytest.mark.slow
 @QUICK
-@given(documented(), st.sampled_from(list(colmap.MODELS)))
+@given(documented(), st.sampled_from(list(opencv.COLMAP_MODELS)))
 def test_colmap_as_documented(camera, model):
     """Published: COLMAP's models over the frame; the centre of the first pixel is 0.5, 0.5."""
     size, f, cx, cy, k, p = camera
     values = {"f": f, "fx": 1.01 * f, "fy": f, "cx": cx, "cy": cy, "p1": p[0], "p2": p[1]}
     values |= {"k1": k[0], "k2": k[1], "k3": k[2], "k4": 0.0, "k5": 0.0, "k6": 0.0}
-    names = colmap.MODELS[model]
-    given_ = colmap.Colmap(model, size, tuple(float(values[name]) for name in names))
-    own = colmap.convert_from_colmap(given_, 0.005)
+    names = opencv.COLMAP_MODELS[model]
+    given_ = opencv.Colmap(model, size, tuple(float(values[name]) for name in names))
+    own = opencv.convert_from_colmap(given_, 0.005)
     rays = trace_rays(own, frame_points(size))
     has = {name: values[name] if name in names else 0.0 for name in values}
     along, down = brown(rays, (has["k1"], has["k2"], has["k3"]), has["p1"], has["p2"])
     u, v = (has["fx"] or f) * along + cx, f * down + cy
     assert off_px(u - 0.5, v - 0.5, size) < SAME_PX
-    back = colmap.convert_to_colmap(own, model)
+    back = opencv.convert_to_colmap(own, model)
     assert back.error_px < SAME_PX
-    again = colmap.convert_from_colmap(back, 0.005)
+    again = opencv.convert_from_colmap(back, 0.005)
     assert np.abs(project_rays(again, rays) - frame_points(size)).max() < SAME_PX
-    simplest = colmap.convert_to_colmap(own)
+    simplest = opencv.convert_to_colmap(own)
     assert simplest.error_px < SAME_PX
     assert len(simplest.params) <= len(names)
 
@@ -129,7 +129,7 @@ def test_colmap_rational():
     """Second method: the rational model of FULL_OPENCV is that of OpenCV, half a pixel apart."""
     k = LONG[8]
     params = (3300.0, 3320.0, 2290.5, 1750.5, *k)
-    of_colmap = colmap.convert_from_colmap(colmap.Colmap("FULL_OPENCV", SIZE, params), PIXEL)
+    of_colmap = opencv.convert_from_colmap(opencv.Colmap("FULL_OPENCV", SIZE, params), PIXEL)
     matrix = np.array([[3300.0, 0, 2290], [0, 3320, 1750], [0, 0, 1]])
     of_opencv = convert_from_opencv(OpenCV(matrix, np.array(k)), PIXEL, SIZE)
     assert of_colmap.interior == pytest.approx(of_opencv.interior, rel=1e-12)
@@ -159,12 +159,12 @@ def test_metashape_as_documented(camera, affinity, more):
     corner2 = (np.hypot(*size) / 2 / f) ** 2
     p34 = np.array(more) / [corner2, corner2**2]
     offset = (cx - size[0] / 2, cy - size[1] / 2)
-    given_ = metashape.Metashape(size, f, *offset, affinity * f, 0.0, tuple(k), (*p, *p34))
-    own = metashape.convert_from_metashape(given_, 0.003)
+    given_ = photogrammetry.Metashape(size, f, *offset, affinity * f, 0.0, tuple(k), (*p, *p34))
+    own = photogrammetry.convert_from_metashape(given_, 0.003)
     rays = trace_rays(own, frame_points(size))
     u, v = metashape_image(rays, given_)
     assert off_px(u - 0.5, v - 0.5, size) < SAME_PX
-    back = metashape.convert_to_metashape(own)
+    back = photogrammetry.convert_to_metashape(own)
     assert back.error_px < SAME_PX
     u, v = metashape_image(rays, back)
     assert off_px(u - 0.5, v - 0.5, size) < SAME_PX
@@ -173,21 +173,21 @@ def test_metashape_as_documented(camera, affinity, more):
 
 def test_metashape_skew_states_its_error(figure):
     """Second method: B2 acts after the distortion; the error of A and B for it is as stated."""
-    given_ = metashape.Metashape(
+    given_ = photogrammetry.Metashape(
         SIZE, 3300.0, -20, 15, 1.5, 4.0, (-0.1, 0.05, 0, 0), (1e-3, 0, 0, 0)
     )
-    own = metashape.convert_from_metashape(given_, PIXEL)
+    own = photogrammetry.convert_from_metashape(given_, PIXEL)
     finer = frame_points(SIZE, (93, 71))
     u, v = metashape_image(trace_rays(own, finer), given_)
     off = np.hypot(u - 0.5 - finer[:, 0], v - 0.5 - finer[:, 1]).max()
     figure("Metashape's B2 of 4 px as A and B, over the frame", f"{own.error_px:.1e} px")
     assert 1e-3 < own.error_px < 0.2
     assert off == pytest.approx(own.error_px, rel=0.05)
-    straight = metashape.convert_from_metashape(
+    straight = photogrammetry.convert_from_metashape(
         replace(given_, k=(0, 0, 0, 0), p=(0, 0, 0, 0)), PIXEL
     )
     assert straight.error_px < SAME_PX  # without distortion B2 is an affinity like any other
-    back = metashape.convert_to_metashape(straight)
+    back = photogrammetry.convert_to_metashape(straight)
     assert (back.b1, back.b2, back.error_px) == pytest.approx((1.5, 4.0, 0), abs=1e-7)
 
 
@@ -199,20 +199,20 @@ def test_pix4d_as_documented(camera):
     size, f, cx, cy, k, p = camera
     pixel = 0.0024
     sensor = (size[0] * pixel, size[1] * pixel)
-    given_ = pix4d.Pix4D(sensor, f * pixel, cx * pixel, cy * pixel, tuple(k[:3]), tuple(p))
-    own = pix4d.convert_from_pix4d(given_, size)
+    given_ = photogrammetry.Pix4D(sensor, f * pixel, cx * pixel, cy * pixel, tuple(k[:3]), tuple(p))
+    own = photogrammetry.convert_from_pix4d(given_, size)
     rays = trace_rays(own, frame_points(size))
     along, down = brown(rays, k[:3], *p)
     u, v = cx + f * along, cy + f * down
     assert off_px(u - 0.5, v - 0.5, size) < SAME_PX
-    back = pix4d.convert_to_pix4d(own)
+    back = photogrammetry.convert_to_pix4d(own)
     assert back.error_px < SAME_PX
     assert back.t == pytest.approx(given_.t, rel=1e-9, abs=1e-15)
     assert (back.px_mm, back.py_mm) == pytest.approx((given_.px_mm, given_.py_mm), rel=1e-12)
 
 
 # published: P frame 1 (the manufacturer's calibration, Pix4D's form), P table 6 set 2 (his own)
-FRAME_1 = pix4d.Pix4D(
+FRAME_1 = photogrammetry.Pix4D(
     (6.17219, 4.62914),
     4.38311,
     3.15437,
@@ -232,13 +232,13 @@ def test_published_pix4d_camera_agrees_with_pessoa(figure):
     for s1 in (1, -1):
         for s2 in (1, -1):
             t1, t2 = FRAME_1.t
-            other = pix4d.convert_from_pix4d(replace(FRAME_1, t=(s1 * t1, s2 * t2)), SIZE)
+            other = photogrammetry.convert_from_pix4d(replace(FRAME_1, t=(s1 * t1, s2 * t2)), SIZE)
             apart = (trace_rays(own, points) - trace_rays(other, points)) * own.interior[0] / pixel
             rms[s1, s2] = np.sqrt(np.mean(np.sum(apart**2, axis=1)))
     figure("P frame 1 against P table 6 set 2, rms", f"{rms[1, 1]:.1f} px")
     assert rms[1, 1] < 10
     assert min(value for signs, value in rms.items() if signs != (1, 1)) > 2 * rms[1, 1]
-    found = pix4d.convert_from_pix4d(FRAME_1, SIZE).interior
+    found = photogrammetry.convert_from_pix4d(FRAME_1, SIZE).interior
     assert found[1:3] == pytest.approx([0.0683, 0.0383], abs=5e-5)
     assert found[7:9] == pytest.approx(SET_2[7:9], rel=0.15)
 

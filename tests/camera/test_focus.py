@@ -7,8 +7,15 @@ import pytest
 from networks import INTERIOR
 from surveyed import by_photographs, places
 
-from tankcal.camera.focus import Lens, depth_factor, refer_to_focus
-from tankcal.camera.model import CONVENTIONS, Form, correct_image_points, distort_image_points
+from tankcal.camera.model import (
+    CONVENTIONS,
+    Form,
+    Lens,
+    correct_image_points,
+    depth_factor,
+    distort_image_points,
+    refer_to_focus,
+)
 from tankcal.survey import adjust_survey
 
 F = 100.0

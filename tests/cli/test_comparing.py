@@ -8,7 +8,7 @@ import pytest
 from tables_of_s1 import former_s1, new_s1
 
 from tankcal.cli import main
-from tankcal.record.comparison import COMPARISON
+from tankcal.record.recalibration import COMPARISON
 
 
 @pytest.fixture

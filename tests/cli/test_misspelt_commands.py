@@ -8,7 +8,7 @@ import pytest
 
 from tankcal.cli import main
 from tankcal.errors import reason_of
-from tankcal.job.starter.examples import EXAMPLES_OF_KEYS, EXAMPLES_OF_TABLES
+from tankcal.job.starter.book import EXAMPLES_OF_KEYS, EXAMPLES_OF_TABLES
 from tankcal.messages import Message
 from tankcal.products.exports.profiles import shipped_profiles
 from tankcal.terminal.showing import say_in_language, speak

@@ -8,8 +8,7 @@ import pytest
 from scipy._lib import _docscrape
 from scipy._lib._array_api import xp_capabilities
 
-from tankcal.terminal.showing import Progress, load_scipy_lightly
-from tankcal.text.time_left import describe_progress
+from tankcal.terminal.showing import Progress, describe_progress, load_scipy_lightly
 
 
 @pytest.mark.parametrize(

@@ -9,13 +9,11 @@ from numpy.testing import assert_allclose
 from page_figures import figures_of
 
 from tankcal.clouds.inside import bottom_points, find_cloud_bottom, find_things
-from tankcal.clouds.inside.bottom import find_bottom_in_cells
-from tankcal.clouds.inside.floor_cells import FloorCells, floor_grid
+from tankcal.clouds.inside.bottom import FloorCells, find_bottom_in_cells, floor_grid
 from tankcal.clouds.wall import find_cloud_wall
 from tankcal.clouds.wall.start import CylinderSurface
 from tankcal.errors import InputError
-from tankcal.tank.bottoms import surveyed_bottom
-from tankcal.tank.terrain import Footprint
+from tankcal.tank.bottoms import Footprint, surveyed_bottom
 
 R = 7.5
 SURFACE = CylinderSurface(np.array([500.0, -20.0, 3.0]), 5.0, (0.004, -0.002))

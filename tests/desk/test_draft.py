@@ -12,8 +12,7 @@ from openpyxl import load_workbook
 import tankcal
 from tankcal.errors import InputError
 from tankcal.products.desk import draft as drafts
-from tankcal.products.desk.draft import Draft
-from tankcal.products.desk.findings import BAD, DOUBTFUL
+from tankcal.products.desk.draft import BAD, DOUBTFUL, Draft
 from tankcal.products.desk.tables import AmbiguousNumber
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

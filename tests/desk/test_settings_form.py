@@ -12,11 +12,17 @@ from job_builder import write_job
 from tankcal.errors import InputError
 from tankcal.job.contract import KEYS
 from tankcal.products.desk.desk import Desk
-from tankcal.products.desk.display import Reader
+from tankcal.products.desk.display import Group, Reader, form_of
 from tankcal.products.desk.draft import Draft
-from tankcal.products.desk.forms import Group, form_of
-from tankcal.products.desk.jobs import RecentJobs, copy_job, create_job, folder_name, pack
-from tankcal.products.desk.states import State, state_of
+from tankcal.products.desk.jobs import (
+    RecentJobs,
+    State,
+    copy_job,
+    create_job,
+    folder_name,
+    pack,
+    state_of,
+)
 from tankcal.text.words import load_words
 
 ROOT = Path(__file__).parents[2]

@@ -10,9 +10,8 @@ from job_builder import write_job, write_workbook
 from tankcal.errors import InputError
 from tankcal.products.desk.desk import Desk
 from tankcal.products.desk.display import Reader
-from tankcal.products.desk.draft import Draft
-from tankcal.products.desk.findings import BAD
-from tankcal.products.desk.journal import Journal
+from tankcal.products.desk.draft import BAD, Draft
+from tankcal.products.desk.jobs import Journal
 from tankcal.products.desk.tables import AmbiguousNumber
 
 

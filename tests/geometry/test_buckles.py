@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from generated_walls import FULL_TURN, GeneratedWall, Survey, _cap, job_of, survey
 
-from tankcal.geometry.patches import find_buckles
+from tankcal.geometry.clutter import find_buckles
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall.finding import find_wall
 

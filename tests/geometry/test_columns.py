@@ -13,9 +13,9 @@ from generated_seams import SHAPES, Ladder, Pipe, Seam, put_before, scan_of, wal
 from generated_walls import job_of, survey
 from page_figures import agree, figures_of
 
+from tankcal.geometry.clutter import find_columns
 from tankcal.geometry.field.amplitudes import assumed_amplitudes
 from tankcal.geometry.field.estimate import hidden_seams_m
-from tankcal.geometry.patches import find_columns
 from tankcal.geometry.shell import UNDECIDED
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall.finding import find_wall, fit_wall

@@ -21,7 +21,7 @@ from generated_seams import (
 from generated_walls import job_of
 from page_figures import figures_of
 
-from tankcal.geometry.patches import find_seams
+from tankcal.geometry.clutter import find_seams
 from tankcal.geometry.shell import find_shell
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall.finding import find_wall

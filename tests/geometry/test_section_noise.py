@@ -5,9 +5,8 @@ import pytest
 import scipy.linalg
 import scipy.stats
 
-from tankcal.geometry.field.amplitudes import assumed_amplitudes
+from tankcal.geometry.field.amplitudes import assumed_amplitudes, bartlett, noise_of_sections
 from tankcal.geometry.field.estimate import WallField
-from tankcal.geometry.field.section_noise import bartlett, noise_of_sections
 from tankcal.geometry.field.sites import Sites, free_design
 
 RADIUS_M, POINTS, COURSES = 7.0, 18, 4

@@ -18,16 +18,22 @@ from tankcal.gum.distributions import (
 from tankcal.gum.monte_carlo import Goal, QuadraticRows, numerical_tolerance, simulate, verdict
 from tankcal.gum.monte_carlo.goal import simulation
 from tankcal.gum.monte_carlo.inputs import inputs_of
-from tankcal.gum.monte_carlo.linear import LEAST, LONG, SHORT, SPACING, Shape, linear_law, shapes_of
 from tankcal.gum.monte_carlo.quadratic import (
+    LEAST,
+    LONG,
     NEAR,
     POINTS,
     SETS,
+    SHORT,
     SHORT_STEP,
+    SPACING,
+    Shape,
     _normal_between,
     _Roots,
     _scores_near,
     _smooth_between,
+    linear_law,
+    shapes_of,
 )
 from tankcal.gum.monte_carlo.quadratic import NEAR as NEAR_LEVEL
 from tankcal.uncertainty import coverage_factor

@@ -13,7 +13,7 @@ from conftest import EXAMPLE
 from tankcal.products.linter.linting import lint
 from tankcal.record import record_of
 from tankcal.report import certificate
-from tankcal.report.outputs.csv_files import write_tables
+from tankcal.report.outputs import write_tables
 from tankcal.report.paper import Paper
 from tankcal.report.workbook import write as write_workbook
 

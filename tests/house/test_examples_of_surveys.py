@@ -16,7 +16,7 @@ import tankcal
 from tankcal.camera.model import PARAMETERS
 from tankcal.products.linter.linting import lint
 from tankcal.record import record_of
-from tankcal.report.outputs.csv_files import write_tables
+from tankcal.report.outputs import write_tables
 from tankcal.report.workbook import write as write_workbook
 
 PHOTOS, STATIONS = EXAMPLE.parent / "silva-1995-photos", EXAMPLE.parent / "total-station"

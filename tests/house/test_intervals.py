@@ -19,7 +19,7 @@ from tankcal.record import record_of, save
 from tankcal.record.schema import to_plain
 from tankcal.record.table import budgets_of
 from tankcal.report import workbook
-from tankcal.report.outputs.csv_files import write_tables
+from tankcal.report.outputs import write_tables
 from tankcal.text.display import volume_text
 
 LYING = {

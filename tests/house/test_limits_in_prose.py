@@ -12,14 +12,16 @@ from scipy import stats
 
 from tankcal import adjust, units
 from tankcal import clouds as cloud_reading
-from tankcal.calibration.parameters import recommendation, significance
+from tankcal.calibration.parameters import judgement, recommendation
 from tankcal.calibration.targets import coded
-from tankcal.clouds.formats import counted_text, e57, isolation, lines
+from tankcal.clouds.formats import e57, isolation, lines
+from tankcal.clouds.formats import lines as counted_text
+from tankcal.clouds.inside import bottom
 from tankcal.clouds.inside import bottom as cloud_bottom
-from tankcal.clouds.inside import floor_cells
-from tankcal.clouds.wall import cells, deciding, features, growing, start
+from tankcal.clouds.wall import cells, deciding, growing, start
+from tankcal.clouds.wall import deciding as features
 from tankcal.clouds.wall import readings as cloud_readings
-from tankcal.geometry import patches, shell
+from tankcal.geometry import clutter, shell
 from tankcal.geometry.field import blunders, components, estimate, sites
 from tankcal.geometry.field.components import COMPONENTS
 from tankcal.geometry.field.places import OF_CYLINDERS, OF_GREAT_CIRCLES, OF_SPHERES
@@ -50,30 +52,31 @@ from tankcal.pipeline.wall_straps import typical_shape_m
 from tankcal.products.fieldbooks import lists
 from tankcal.products.gauge import deviation
 from tankcal.products.gauge import reading as gauge
-from tankcal.products.inspection import boards, edges, welds
-from tankcal.products.linter import grids, totals
+from tankcal.products.inspection import edges, weld_gaps, welds
+from tankcal.products.linter import grids, volumes
 from tankcal.products.quantity import reading as quantity
 from tankcal.products.recalibration import (
     basis,
     comparison,
     read_table,
     solid_geometry,
-    verdict,
+)
+from tankcal.products.recalibration import (
+    comparison as verdict,
 )
 from tankcal.products.upkeep import estimation, flows, watching
 from tankcal.products.upkeep import reading as upkeep
 from tankcal.products.upkeep import upkeep as results_of_upkeep
 from tankcal.record.columns import MOST_ROWS
-from tankcal.report import attachments, letterhead
-from tankcal.report.inspection import paper as inspection_paper
+from tankcal.report import attachments, laboratory
+from tankcal.report.inspection import tables as inspection_paper
 from tankcal.report.survey import quality
 from tankcal.report.web import calculator_data
 from tankcal.survey import poses, readings, strapping
 from tankcal.survey.diagnosis import blunders as wrong_readings
 from tankcal.tank import gauging
 from tankcal.tank.liquid import adjustment as liquid_adjustment
-from tankcal.tank.volume_correction.brazil import Brazil
-from tankcal.tank.volume_correction.petroleum import Petroleum
+from tankcal.tank.volume_correction.petroleum import Brazil, Petroleum
 
 MM, PERCENT, PPM = 1e3, 100, 1e6
 
@@ -116,7 +119,7 @@ LIMITS = [
     (
         "docs/report.md",
         "at most () kB and () pixels along a side",
-        [letterhead.MAX_LOGO_BYTES / 1000, letterhead.MAX_LOGO_PIXELS],
+        [laboratory.MAX_LOGO_BYTES / 1000, laboratory.MAX_LOGO_PIXELS],
     ),
     ("docs/report-code.md", "A table of up to () rows is not divided", [page_constant("short")]),
     ("docs/report-code.md", "Tables end after () rows", [quality.MOST_ROWS]),
@@ -138,7 +141,7 @@ LIMITS = [
     (
         "docs/table.md",
         "ends () mm or more below it, if this is a step or more than () mm",
-        [MM * totals._LEAST_GAP_M, MM * totals._USUAL_GAP_M],
+        [MM * volumes._LEAST_GAP_M, MM * volumes._USUAL_GAP_M],
     ),
     (
         "docs/table.md",
@@ -146,11 +149,11 @@ LIMITS = [
         "`--nominal-diameter` and `--nominal-height`, or () % from `--nominal-volume`; without "
         "either, a cylinder more than () times as wide as high, or () times as high as wide",
         [
-            PERCENT * totals._FAR,
-            PERCENT * totals._CLOSE_DIAMETER,
-            PERCENT * totals._CLOSE_VOLUME,
-            totals._FLATTEST,
-            1 / totals._SLIMMEST,
+            PERCENT * volumes._FAR,
+            PERCENT * volumes._CLOSE_DIAMETER,
+            PERCENT * volumes._CLOSE_VOLUME,
+            volumes._FLATTEST,
+            1 / volumes._SLIMMEST,
         ],
     ),
     (
@@ -756,13 +759,13 @@ LIMITS += [
     (
         "docs/studies/clouds-wall.md",
         "are counted in classes of () mm. The range is () m, or () of the radius",
-        [MM * floor_cells.BIN_M, floor_cells.LEAST_REACH_M, floor_cells.REACH],
+        [MM * bottom.BIN_M, bottom.LEAST_REACH_M, bottom.REACH],
     ),
     (
         "docs/studies/clouds-wall.md",
         "meet the foot of the shell within () m (or () % of the radius) and appear in () % of the",
         [
-            cloud_bottom.FOOT_M,
+            cloud_bottom.BOTTOM_FOOT_M,
             PERCENT * cloud_bottom.FOOT_SHARE,
             PERCENT * cloud_bottom.LEAST_SHARE,
         ],
@@ -840,7 +843,7 @@ LIMITS += [
     (
         "docs/studies/wall-or-fitting.md",
         "with a median of () mm off the wall at most",
-        [MM * patches.FARTHEST_M],
+        [MM * clutter.FARTHEST_M],
     ),
     (
         "docs/studies/wall-or-fitting.md",
@@ -909,7 +912,7 @@ LIMITS += [
     ),
     ("docs/archive.md", "long tables of more than () MB", [attachments.LARGEST_PACKED / 1e6]),
     ("docs/studies/camera.md", "with () px added", [coded.SD_FLOOR_PX]),
-    ("docs/studies/camera.md", "`--alpha` ()", [significance.ALPHA]),
+    ("docs/studies/camera.md", "`--alpha` ()", [judgement.ALPHA]),
     (
         "docs/studies/camera.md",
         "with a share below () % (0.7 % in print). Of the parameters that load above () on one "
@@ -932,7 +935,7 @@ LIMITS += [
         "accepted points that deviates by () mm and () standard",
         [MM * blunders.LEAST_M, blunders.LEAST_W],
     ),
-    ("docs/studies/methods.md", "rejected points within () mm that", [MM * patches.FARTHEST_M]),
+    ("docs/studies/methods.md", "rejected points within () mm that", [MM * clutter.FARTHEST_M]),
     (
         "docs/conventions.md",
         "with conventional weights, () % more for rho = () kg/m3",
@@ -942,15 +945,15 @@ LIMITS += [
     (
         "docs/inspection-welds.md",
         "A board of () mm (36 in) is centred",
-        [MM * boards.BOARD_M],
+        [MM * weld_gaps.BOARD_M],
     ),
-    ("docs/inspection-welds.md", "largest |g| within () mm of it", [MM * boards.REACH_M]),
+    ("docs/inspection-welds.md", "largest |g| within () mm of it", [MM * weld_gaps.REACH_M]),
     (
         "docs/inspection-welds.md",
         "A peak of () mm exp(-|s|/w) has gaps of (), () and () mm for w = (), () and () m",
         [
             8,
-            *(8 * (1 - math.exp(-boards.BOARD_M / 2 / w)) for w in (0.1, 0.15, 0.3)),
+            *(8 * (1 - math.exp(-weld_gaps.BOARD_M / 2 / w)) for w in (0.1, 0.15, 0.3)),
             0.1,
             0.15,
             0.3,
@@ -961,20 +964,20 @@ LIMITS += [
         "are divided: () mm across the weld (up to () mm where",
         [MM * welds.ACROSS_M, MM * welds.WIDEST_M],
     ),
-    ("docs/studies/inspection-welds.md", "through the cells within () mm", [MM * boards.END_M]),
-    ("docs/studies/inspection-welds.md", "The middle () mm of a weld", [2 * MM * boards.BEAD_M]),
+    ("docs/studies/inspection-welds.md", "through the cells within () mm", [MM * weld_gaps.END_M]),
+    ("docs/studies/inspection-welds.md", "The middle () mm of a weld", [2 * MM * weld_gaps.BEAD_M]),
     (
         "docs/studies/inspection-welds.md",
         "over all boards deviates by () mm or more",
-        [MM * boards.LEAST_BEAD_M],
+        [MM * weld_gaps.LEAST_BEAD_M],
     ),
     (
         "docs/studies/inspection-welds.md",
         "a hole of more than () mm near the weld, an end without wall on both sides, or a step "
         "that no plate has (() mm from",
-        [MM * boards.HOLE_M, MM * boards.STEP_M],
+        [MM * weld_gaps.HOLE_M, MM * weld_gaps.STEP_M],
     ),
-    ("docs/inspection-welds.md", "A step of () mm or more is not", [MM * boards.STEP_M]),
+    ("docs/inspection-welds.md", "A step of () mm or more is not", [MM * weld_gaps.STEP_M]),
     (
         "docs/limits.md",
         "a bulge of () mm rms is assumed, uncertain by a factor of ()",
@@ -988,7 +991,7 @@ LIMITS += [
         "farther from the wall than () % of the radius, and farther than () mm",
         [PERCENT * shell.WALL_BAND, MM * shell.LEAST_BAND_M],
     ),
-    ("docs/limits.md", "or a pipe within () mm of the wall", [MM * patches.FARTHEST_M]),
+    ("docs/limits.md", "or a pipe within () mm of the wall", [MM * clutter.FARTHEST_M]),
     ("docs/limits.md", "or pipes less than () mm from the wall", [MM * blunders.LEAST_M]),
     (
         "docs/limits.md",
@@ -1049,7 +1052,7 @@ LIMITS += [
         "docs/inspection.md",
         "gap under a board of () mm centred on a vertical or a horizontal weld: the largest gap "
         "within () mm",
-        [MM * boards.BOARD_M, MM * boards.REACH_M],
+        [MM * weld_gaps.BOARD_M, MM * weld_gaps.REACH_M],
     ),
     (
         "docs/studies/inspection.md",

@@ -16,11 +16,9 @@ from tankcal.job.starter import write_input_workbook, write_starter
 from tankcal.job.tables import in_book
 from tankcal.messages import Message
 from tankcal.record import record_of
-from tankcal.terminal.input_language import read_job_language
-from tankcal.terminal.showing import say_in_language, speak
-from tankcal.text.form_words import meant, word_of
+from tankcal.terminal.showing import read_job_language, say_in_language, speak
 from tankcal.text.shipped import nearest_language
-from tankcal.text.words import load_words, translate_record
+from tankcal.text.words import load_words, meant, translate_record, word_of
 
 OTHERS = ("pt-BR", "es")
 ENGLISH = re.compile(r"\b(the|expected|found|missing|blank|row|sheet|with|number|is|of)\b")

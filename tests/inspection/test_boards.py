@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from tankcal.products.inspection.boards import BOARD_M, bead_height, board_gap, profile_gaps
+from tankcal.products.inspection.weld_gaps import BOARD_M, bead_height, board_gap, profile_gaps
 
 CELL_M = 0.0125
 CELLS_M = CELL_M * np.arange(-42, 43)

@@ -8,9 +8,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tankcal.camera.model import PARAMETERS, Form, distort_image_points
-from tankcal.products.intercomparison.observers import METHODS, tape
-from tankcal.products.intercomparison.observers.cloud import observe_cloud
-from tankcal.products.intercomparison.observers.photographs import camera_rotation, photograph
+from tankcal.products.intercomparison import observers
+from tankcal.products.intercomparison.observers import (
+    METHODS,
+    camera_rotation,
+    observe_cloud,
+    photograph,
+)
 from tankcal.products.intercomparison.site import Chance, observe_site, request_table
 from tankcal.products.intercomparison.tank import draw_tank
 
@@ -75,12 +79,12 @@ def test_a_tape_reads_the_mean_width_of_the_hull(tank):
     xy = tank.places_m(azimuth, np.full(6000, z), outside=True)[:, :2]
     turn = 2 * np.pi * np.arange(1500) / 1500
     support = np.max(np.column_stack([np.sin(turn), np.cos(turn)]) @ xy.T, axis=1)
-    assert_allclose(tape.girth_m(tank, z), 2 * np.pi * support.mean(), atol=2e-4)
+    assert_allclose(observers.girth_m(tank, z), 2 * np.pi * support.mean(), atol=2e-4)
     parts = perfect(tank, "tape")
     shell_c = parts.settings["survey.shell_temperature_c"]
     reading, pull = columns(parts, "circumferences", "reading_m", "tension_n")
     tape_unit = (1 + 1.15e-5 * (shell_c - 20)) * (1 + (pull[0] - 50) / 5.15e5)
-    expected = tank.expansion_factor(shell_c) * tape.girth_m(tank, z) + np.pi * 2e-4
+    expected = tank.expansion_factor(shell_c) * observers.girth_m(tank, z) + np.pi * 2e-4
     assert_allclose(reading[0] * tape_unit, expected, atol=U_READ_M)
 
 

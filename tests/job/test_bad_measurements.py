@@ -19,7 +19,7 @@ from survey_builder import WALL, read_on_comparator, survey_parts
 
 from tankcal.errors import InputError
 from tankcal.job import Job, load
-from tankcal.job.checks.survey.files import plain
+from tankcal.job.checks.survey.readings import plain
 from tankcal.job.tables import SURVEY_TABLES
 
 QUICK = settings(max_examples=60, suppress_health_check=[*HealthCheck])

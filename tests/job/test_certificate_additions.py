@@ -14,7 +14,7 @@ from tankcal.errors import InputError
 from tankcal.job.building import _add_years
 from tankcal.job.rule_files import parse_rule
 from tankcal.job.tables import Log
-from tankcal.tank.rules.model import PLATE
+from tankcal.tank.rules import PLATE
 
 SEALS = """
 [seals.S-1]

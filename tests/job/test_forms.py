@@ -14,7 +14,7 @@ from tankcal.job.starter.writing import Form
 from tankcal.products.batch.finding import find_jobs
 from tankcal.products.batch.options import Options
 from tankcal.report.folders import default_folder
-from tankcal.terminal.input_language import read_job_language
+from tankcal.terminal.showing import read_job_language
 from tankcal.text.shipped import DEFAULT, LANGUAGES
 
 BLANKS = [

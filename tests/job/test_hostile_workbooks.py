@@ -14,8 +14,8 @@ import pytest
 from job_builder import job_parts, write_book
 from spoilt import problems_of
 
-from tankcal.job.excel import MAX_COLUMNS, Unreadable, archive, column_letters, read_sheets
-from tankcal.job.excel.archive import parse
+from tankcal.job import excel
+from tankcal.job.excel import MAX_COLUMNS, Unreadable, column_letters, parse, read_sheets
 
 SHEET, STRINGS = "xl/worksheets/sheet2.xml", "xl/sharedStrings.xml"
 SECONDS, BYTES = 40.0, 150_000_000  # openpyxl's; ours takes one to three seconds
@@ -143,7 +143,7 @@ def test_unneeded_workbook_parts_are_refused(book, name, words):
     [
         b'<!DOCTYPE x [<!ENTITY a "b">]><x>&a;</x>',
         b'<?xml version="1.0"?><!DOCTYPE x SYSTEM "file:///etc/passwd"><x/>',
-        b"<x>" + b" " * (archive.CHUNK_BYTES - 8) + b"<y/><!DOCTYPE x></x>",
+        b"<x>" + b" " * (excel.CHUNK_BYTES - 8) + b"<y/><!DOCTYPE x></x>",
         '<?xml version="1.0" encoding="utf-16"?><x/>'.encode("utf-16"),
         b'<?xml version="1.0" encoding="utf-7"?><x/>',
     ],

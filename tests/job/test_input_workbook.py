@@ -32,8 +32,14 @@ from tankcal.job.contract import (
 from tankcal.job.field_values import read_value
 from tankcal.job.sheets import is_read
 from tankcal.job.starter import write_input_workbook
-from tankcal.job.starter.examples import EXAMPLES_OF_KEYS, EXAMPLES_OF_TABLES
-from tankcal.job.starter.table_sheet import LONGEST_LIST, LONGEST_MESSAGE, LONGEST_TITLE, rule_of
+from tankcal.job.starter.book import (
+    EXAMPLES_OF_KEYS,
+    EXAMPLES_OF_TABLES,
+    LONGEST_LIST,
+    LONGEST_MESSAGE,
+    LONGEST_TITLE,
+    rule_of,
+)
 from tankcal.job.starter.texts import TABLE_NOTES, english_notes, split_unit, texts_in
 from tankcal.job.starter.writing import STRAPPED, Form
 from tankcal.record import record_of

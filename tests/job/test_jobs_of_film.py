@@ -15,8 +15,7 @@ from survey_builder import read_on_comparator, survey_parts
 
 import tankcal
 from tankcal.job import load
-from tankcal.record.adjusted import fiducials_of
-from tankcal.record.adjustment import adjustment_of
+from tankcal.record.adjustment import adjustment_of, fiducials_of
 from tankcal.record.schema import to_plain
 from tankcal.report.survey.results import image_coordinates
 from tankcal.survey.network_of_survey import gather

@@ -10,7 +10,7 @@ from job_builder import assert_same_job, job_parts, strapped_parts, write_folder
 
 from tankcal.errors import InputError
 from tankcal.job import load
-from tankcal.job.decimals import has_two_meanings
+from tankcal.job.field_values import has_two_meanings
 
 ENCODINGS = ("utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "cp1252")
 

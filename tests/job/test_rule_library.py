@@ -16,7 +16,7 @@ from tankcal.record.table import rule_of
 from tankcal.report import certificate
 from tankcal.report.paper import Paper
 from tankcal.report.uncertainty import rule as chapter
-from tankcal.tank.rules.verdict import judge, judge_uncertainty
+from tankcal.tank.rules import judge, judge_uncertainty
 from tankcal.text.shipped import LANGUAGES, shipped_folder
 from tankcal.text.words import load_words
 

@@ -23,11 +23,10 @@ from tankcal.products.linter.examination import (
     leave_one_out,
     most_suspicious,
 )
-from tankcal.products.linter.headings import heading_of
 from tankcal.products.linter.linting import lint
 from tankcal.products.linter.numbers import Style, read_number, style_of
-from tankcal.products.linter.totals import Nominal
-from tankcal.products.linter.volumes import suggest_number
+from tankcal.products.linter.units import heading_of
+from tankcal.products.linter.volumes import Nominal, suggest_number
 from tankcal.products.recalibration.reading import read_former
 from tankcal.tank.dips import dip_label, table_heights
 

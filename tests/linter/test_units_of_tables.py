@@ -16,8 +16,8 @@ from tables_of_others import (
 
 from tankcal.errors import InputError
 from tankcal.job.tables import Log
-from tankcal.products.linter.headings import heading_of
 from tankcal.products.linter.linting import lint
+from tankcal.products.linter.units import heading_of
 from tankcal.products.recalibration.reading import read_rows
 from tankcal.text.words import load_words, say
 

@@ -16,7 +16,7 @@ class CalipersMethod(Method):
     tables = ("calipers",)
 
     def columns(self):
-        from tankcal.job.contract.shorthand import positive
+        from tankcal.job.fields import positive
 
         diameter = positive("diameter_m", "inside diameter, metres", 100, required=True)
         sd = positive("s_mm", "standard deviation of the reading, millimetres", 100, required=True)

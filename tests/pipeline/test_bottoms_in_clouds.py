@@ -18,8 +18,7 @@ from test_walls_in_clouds import scene_parts
 
 import tankcal
 from tankcal.clouds.inside import bottom_points
-from tankcal.clouds.inside.bottom import find_bottom_in_cells
-from tankcal.clouds.inside.floor_cells import FloorCells, floor_grid
+from tankcal.clouds.inside.bottom import FloorCells, find_bottom_in_cells, floor_grid
 from tankcal.clouds.wall.start import CylinderSurface
 from tankcal.job.model import Bottom
 from tankcal.methods.clouds.bottom import CloudInside, with_bottom
@@ -29,9 +28,8 @@ from tankcal.record.versions import RECORD
 from tankcal.survey.registration import register
 from tankcal.survey.scans import ScanSetup
 from tankcal.survey.wall_hits import RangingInstrument
-from tankcal.tank.bottoms import surveyed_bottom
+from tankcal.tank.bottoms import Footprint, surveyed_bottom
 from tankcal.tank.budgets import cause_factors
-from tankcal.tank.terrain import Footprint
 
 R, DEPTH_M, POST = 4.0, 0.2, (1.2, 0.9, 0.15)
 

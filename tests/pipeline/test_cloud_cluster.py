@@ -23,7 +23,7 @@ from written_clouds import UNMOVED, some_wall, write_cloud, write_ptx
 import tankcal
 from tankcal.clouds import describe_cloud
 from tankcal.clouds.inside import ThingCells, sample_things
-from tankcal.clouds.inside.floor_cells import FloorCells, floor_grid, sum_floor_cells
+from tankcal.clouds.inside.bottom import FloorCells, floor_grid, sum_floor_cells
 from tankcal.clouds.wall.cells import SUMMED, CellGrid
 from tankcal.clouds.wall.start import CylinderSurface
 from tankcal.errors import InputError, Problem

@@ -21,8 +21,7 @@ import tankcal
 from tankcal.job.model import DeclaredInput
 from tankcal.methods.liquid.warnings import check_liquid
 from tankcal.pipeline.liquid.adjustment import adjust_liquid
-from tankcal.pipeline.liquid.body import join_body
-from tankcal.pipeline.liquid.geometry import geometry_alone, geometry_beside
+from tankcal.pipeline.liquid.body import geometry_alone, geometry_beside, join_body
 from tankcal.pipeline.liquid.measuring import is_steady_leak, measure_by_liquid
 from tankcal.pipeline.surveying import find_survey
 from tankcal.record import record_of

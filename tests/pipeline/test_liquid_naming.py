@@ -13,7 +13,7 @@ from page_figures import figures_of, shares_agree, value_of
 
 from tankcal.job.model import DeclaredInput
 from tankcal.pipeline.liquid.adjustment import adjust_liquid
-from tankcal.pipeline.liquid.geometry import Geometry, find_nominal_wall, geometry_alone
+from tankcal.pipeline.liquid.body import Geometry, find_nominal_wall, geometry_alone
 from tankcal.pipeline.liquid.measuring import alternatives_of, is_steady_leak
 from tankcal.tank.liquid import name_causes
 from tankcal.tank.solids import LyingTank

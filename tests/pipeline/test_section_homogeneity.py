@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from scipy.stats import chi2
 
 import tankcal
-from tankcal.geometry.field.section_noise import bartlett
+from tankcal.geometry.field.amplitudes import bartlett
 from tankcal.geometry.outlines import polar
 from tankcal.pipeline.checks.wall import homogeneity_of, warn_of_sections
 from tankcal.pipeline.wall.finding import find_wall

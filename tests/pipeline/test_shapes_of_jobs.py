@@ -8,7 +8,7 @@ from scipy import stats
 
 import tankcal
 from tankcal.errors import InputError, SolutionError
-from tankcal.pipeline.tanks.corrections import gross_at_top
+from tankcal.pipeline.tanks import gross_at_top
 from tankcal.tank.heads import End
 from tankcal.tank.solids import LyingTank
 from tankcal.tank.tips import tip_of

@@ -14,7 +14,7 @@ from scipy.stats import binom
 
 import tankcal
 from tankcal.errors import InputError, SolutionError
-from tankcal.pipeline.taped_wall import BY_CHANCE, course_apart
+from tankcal.pipeline.wall_straps import BY_CHANCE, course_apart
 from tankcal.record import record_of
 
 OF_SLIPS = {

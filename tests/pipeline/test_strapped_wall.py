@@ -13,7 +13,7 @@ import tankcal
 from tankcal.errors import InputError, SolutionError
 from tankcal.methods.strapping.wall import find_strapped_wall
 from tankcal.methods.strapping.warnings import limit_of_repeats
-from tankcal.pipeline.taped_wall import exchanged_courses, field_of_readings
+from tankcal.pipeline.wall_straps import exchanged_courses, field_of_readings
 from tankcal.record import record_of
 from tankcal.survey.strapping import Obstruction
 

@@ -13,11 +13,11 @@ import tankcal
 from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.planning import load_plan, predict, what_helps
-from tankcal.planning.changes import changes_of, cost_of
+from tankcal.planning.improvements import changes_of, cost_of
 from tankcal.planning.wall.prediction import predict_wall_table
 from tankcal.report.planning import empty_job
+from tankcal.report.planning.rows import field_tables_of_wall
 from tankcal.report.planning.wall_paper import WallPaper, wall_sheets
-from tankcal.report.planning.wall_rows import field_tables_of_wall
 
 SIDE_M = 2 * 12.5 * np.sin(np.pi / 8)  # of the ring
 ARCSEC = np.pi / 180 / 3600

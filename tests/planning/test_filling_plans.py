@@ -25,7 +25,7 @@ from tankcal.planning.wall.changes import wall_changes_of
 from tankcal.planning.wall.prediction import predict_wall_table
 from tankcal.record.plan import WALL_PLAN
 from tankcal.report.planning import empty_job
-from tankcal.report.planning.wall_rows import rows_of_runs
+from tankcal.report.planning.rows import rows_of_runs
 from tankcal.tank.liquid.adjustment import averaged
 from tankcal.uncertainty import combine
 
@@ -329,7 +329,7 @@ OF_RUNS = {"step", "top_of_run", "half_steps", "empty_start", "run", "accuracy",
 
 
 def changes_of_everything(plan):
-    from tankcal.planning.changes import changes_of
+    from tankcal.planning.improvements import changes_of
 
     return what_helps(plan, tuple(
         one for one in changes_of(plan) if one.item in OF_RUNS and one.name != "straps"

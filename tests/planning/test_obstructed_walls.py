@@ -11,7 +11,7 @@ from wall_plan_folders import HITS, LINES, TANGENTS, plan_of
 from tankcal.errors import InputError
 from tankcal.planning import load_plan, predict
 from tankcal.planning.wall.changes import wall_count
-from tankcal.report.planning.wall_rows import field_tables_of_wall
+from tankcal.report.planning.rows import field_tables_of_wall
 
 BOX = '[[obstacles]]\nname = "stair"\nkind = "box"\nfrom_m = {}\nto_m = {}\n\n[limits]'
 PILLAR = (

@@ -14,13 +14,10 @@ from tankcal.cli import main
 from tankcal.errors import InputError, SolutionError
 from tankcal.job import load
 from tankcal.planning import load_plan, predict
-from tankcal.planning.changes import changes_of, cost_of
-from tankcal.planning.improvements import what_helps, what_would_do
+from tankcal.planning.improvements import changes_of, cost_of, what_helps, what_would_do
 from tankcal.planning.measurements import draw_measurements
 from tankcal.report.planning import empty_job, files
-from tankcal.report.planning.field_sheets import sheets
-from tankcal.report.planning.outlook import outlook
-from tankcal.report.planning.paper import PlanPaper
+from tankcal.report.planning.pages import PlanPaper, outlook, sheets
 from tankcal.report.planning.rows import bases
 
 ARCSEC = np.pi / 180 / 3600

@@ -7,8 +7,7 @@ import pytest
 from conftest import EXAMPLE
 
 from tankcal.planning import load_plan, predict
-from tankcal.planning.changes import changes_of, cost_of
-from tankcal.planning.improvements import greedy, smallest, what_helps
+from tankcal.planning.improvements import changes_of, cost_of, greedy, smallest, what_helps
 from tankcal.planning.model import Box
 from tankcal.text.naming import is_name
 

@@ -14,7 +14,7 @@ from tankcal.cli import main
 from tankcal.errors import InputError, SolutionError
 from tankcal.planning import improvements as helping
 from tankcal.planning import load_plan, predict
-from tankcal.planning.changes import changes_of
+from tankcal.planning.improvements import changes_of
 from tankcal.report.planning import FILES, JOB
 
 PLAN = EXAMPLE.parent / "plan-silva"

@@ -20,10 +20,8 @@ from tankcal.report import planning as planning_papers
 from tankcal.report.numbers import UNITS
 from tankcal.report.pdf import pdf
 from tankcal.report.planning import files, rows
-from tankcal.report.planning import paper as papers
-from tankcal.report.planning.field_sheets import sheets
-from tankcal.report.planning.outlook import outlook
-from tankcal.report.planning.paper import PlanPaper
+from tankcal.report.planning import pages as papers
+from tankcal.report.planning.pages import PlanPaper, outlook, sheets
 from tankcal.report.planning.rows import field_tables
 from tankcal.text.shipped import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words

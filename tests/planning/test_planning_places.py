@@ -9,9 +9,8 @@ from plan_folders import PLAN, changed_plan, with_setups
 from tankcal.errors import InputError
 from tankcal.geometry.rotations import view_of_rotation
 from tankcal.planning import load_plan, predict
-from tankcal.planning.changes import changes_of
-from tankcal.planning.places import row_heights_m
-from tankcal.planning.visibility import find_visible
+from tankcal.planning.improvements import changes_of
+from tankcal.planning.places import find_visible, row_heights_m
 
 
 @pytest.fixture(scope="module")

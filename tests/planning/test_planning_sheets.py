@@ -13,11 +13,10 @@ from tankcal.planning import load_plan, predict
 from tankcal.planning.improvements import what_helps
 from tankcal.planning.model import Pillar, Tie
 from tankcal.planning.places import full_turn, place_of
-from tankcal.report.planning import figures, files, rows, sketches
-from tankcal.report.planning.field_sheets import sheets
-from tankcal.report.planning.outlook import outlook
-from tankcal.report.planning.paper import PlanPaper
-from tankcal.report.planning.stands import stands
+from tankcal.report.planning import figures, files, rows
+from tankcal.report.planning import figures as sketches
+from tankcal.report.planning.figures import stands
+from tankcal.report.planning.pages import PlanPaper, outlook, sheets
 from tankcal.report.plots.style import INK, RED
 
 OBSTACLE = (
@@ -138,8 +137,7 @@ def test_a_plumb_line_is_no_tape(hidden):
 
 
 def _changes(plan, item):
-    from tankcal.planning.changes import changes_of
-    from tankcal.planning.improvements import Effect
+    from tankcal.planning.improvements import Effect, changes_of
 
     return [Effect(one, 0.0, 0.0, 0.0, 0) for one in changes_of(plan, items=(item,))]
 

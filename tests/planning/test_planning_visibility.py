@@ -10,7 +10,7 @@ from plan_folders import changed_plan
 from tankcal.geometry.rotations import rotation_of_view
 from tankcal.planning import load_plan, predict
 from tankcal.planning.model import Box, Limits, Pillar, Shell
-from tankcal.planning.visibility import find_hidden, find_in_frame, find_in_sight, find_visible
+from tankcal.planning.places import find_hidden, find_in_frame, find_in_sight, find_visible
 
 EYE = np.array([0.0, 0.0, 2.0])
 

@@ -29,8 +29,7 @@ from tankcal.methods.tangents.wall import touch_wall
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.table import compute_table
 from tankcal.planning import load_plan, predict, smallest, what_helps
-from tankcal.planning.changes import changes_of
-from tankcal.planning.improvements import Effect
+from tankcal.planning.improvements import Effect, changes_of
 from tankcal.planning.wall.changes import instruments_in_use, wall_changes_of
 from tankcal.planning.wall.design_tables import tangent_sight
 from tankcal.planning.wall.model import PlannedHits, PlannedStrap, even_radius_m, evenness_of_limbs
@@ -40,8 +39,8 @@ from tankcal.planning.wall.reading import change_plan, tables_of
 from tankcal.record.plan import WALL_PLAN, plain_of_wall
 from tankcal.report.planning import empty_job, figures, files
 from tankcal.report.planning.empty_job import form_of_wall
+from tankcal.report.planning.rows import field_tables_of_wall
 from tankcal.report.planning.wall_paper import WallPaper, wall_outlook, wall_sheets
-from tankcal.report.planning.wall_rows import field_tables_of_wall
 
 STRAPS_ALONE = (
     ('courses = ["1"]\nat_percent = [20]\nreadings = 3\n', ""),

@@ -13,11 +13,17 @@ from written_pdfs import write_pdf
 
 from tankcal.cli import main
 from tankcal.products.assess.assessing import REQUIREMENTS, assess, plain_assessment
+from tankcal.products.assess.entries import LABELS, PLACEHOLDER, find_claim, find_interval
 from tankcal.products.assess.evidence import CERTIFICATE
 from tankcal.products.assess.paper import DOCUMENT, AssessmentPaper
-from tankcal.products.assess.requirements import MAJOR, MEMORY, OBSERVATION, READ, SUMMARY
-from tankcal.products.assess.saved import ASSESSMENT
-from tankcal.products.assess.wording import LABELS, PLACEHOLDER, find_claim, find_interval
+from tankcal.products.assess.requirements import (
+    ASSESSMENT,
+    MAJOR,
+    MEMORY,
+    OBSERVATION,
+    READ,
+    SUMMARY,
+)
 from tankcal.report.outputs import RECORD
 from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import load_words

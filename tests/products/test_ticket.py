@@ -11,11 +11,10 @@ from page_figures import agree, figures_of, value_of
 
 from tankcal.cli import main
 from tankcal.errors import InputError
-from tankcal.products.quantity.chain import QUANTITIES, Gauging, Product, follow_chain
+from tankcal.products.quantity.chain import QUANTITIES, Gauging, Product, Transfer, follow_chain
 from tankcal.products.quantity.reading import read_tickets
 from tankcal.products.quantity.results import check_output, rows_of
 from tankcal.products.quantity.table import TankTable, read_table
-from tankcal.products.quantity.transfer import Transfer
 from tankcal.tank.fittings import floating_roof
 from tankcal.tank.gauging import UNCERTAINTIES
 from tankcal.tank.volume_correction.petroleum import Petroleum, glass_correction

@@ -11,7 +11,7 @@ from tankcal.products.quantity.chain import QUANTITIES
 from tankcal.products.quantity.reading import SECTIONS, read_tickets
 from tankcal.products.quantity.starter import FORM, starter_text, write_starter
 from tankcal.products.quantity.table import TankTable
-from tankcal.tank.volume_correction.factors import FactorTable
+from tankcal.tank.volume_correction.corrections import FactorTable
 from tankcal.tank.volume_correction.petroleum import Petroleum
 from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import load_words

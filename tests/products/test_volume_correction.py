@@ -7,19 +7,20 @@ from page_figures import figures_of
 
 from tankcal.products.quantity.chain import Gauging, Product, follow_chain
 from tankcal.products.quantity.table import TankTable
-from tankcal.tank.volume_correction.alcohol import Ethanol, mixture_density
-from tankcal.tank.volume_correction.brazil import Brazil
-from tankcal.tank.volume_correction.corrections import Constant
-from tankcal.tank.volume_correction.gases import WATER_60F, LiquefiedGas
+from tankcal.tank.volume_correction.corrections import Constant, Ethanol, mixture_density
 from tankcal.tank.volume_correction.petroleum import (
     KPA_PER_PSI,
+    WATER_60F,
     WATER_1980,
     WATER_2004,
+    Brazil,
+    LiquefiedGas,
+    OutsideRangeError,
     Petroleum,
     density_of_gravity,
     glass_correction,
+    inside,
 )
-from tankcal.tank.volume_correction.ranges import OutsideRangeError, inside
 
 
 def _celsius(fahrenheit):

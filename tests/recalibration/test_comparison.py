@@ -12,7 +12,7 @@ from tables_of_s1 import HEIGHTS, PLATES, RADII, former_s1, new_s1, rings_m3
 
 from tankcal.errors import InputError
 from tankcal.products.recalibration.comparison import Asked, compare, compare_files
-from tankcal.record.comparison import COMPARISON, STEPS, ComparisonFile
+from tankcal.record.recalibration import COMPARISON, STEPS, ComparisonFile
 from tankcal.record.schema import from_plain, to_plain
 
 EXAMPLE = Path(__file__).with_name("comparison.json")

@@ -12,7 +12,7 @@ from tables_of_s1 import HEIGHTS, PLATES, former_s1
 from tankcal.errors import InputError
 from tankcal.products.recalibration.comparison import compare
 from tankcal.products.recalibration.history import DatedTable, history_of
-from tankcal.record.history import HISTORY, HistoryFile
+from tankcal.record.recalibration import HISTORY, HistoryFile
 from tankcal.record.schema import from_plain, to_plain
 
 K = 1.959963984540054

@@ -12,12 +12,8 @@ from tables_of_s1 import former_s1
 
 from tankcal.cli import main
 from tankcal.errors import InputError
-from tankcal.products.recalibration.history_inputs import (
-    _worst_checks,
-    find_files,
-    history_of_files,
-)
-from tankcal.record.history import HISTORY
+from tankcal.products.recalibration.history import _worst_checks, find_files, history_of_files
+from tankcal.record.recalibration import HISTORY
 
 RECORDS = Path(__file__).parents[1] / "records" / "1"
 EXAMPLE = Path(__file__).parents[2] / "examples" / "inspection"

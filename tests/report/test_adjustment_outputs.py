@@ -27,17 +27,16 @@ from tankcal.cli import main
 from tankcal.job.covariance import check_covariance, read_covariance
 from tankcal.memory import return_freed_memory, without_collection
 from tankcal.pipeline.chain import adjust_job
-from tankcal.record.adjusted import _edge_effect, point_results_of
-from tankcal.record.adjustment import _group
+from tankcal.record.adjustment import _edge_effect, _group, point_results_of
 from tankcal.record.columns import rows_of
 from tankcal.report import attachments, outputs, workbook
 from tankcal.report.document import blocks_of
 from tankcal.report.notebook import execute, join_templates
-from tankcal.report.outputs import csv_files
-from tankcal.report.outputs.csv_files import write_csv
+from tankcal.report.outputs import write_csv
 from tankcal.report.paper import Paper
 from tankcal.report.papers import parts_without_content
 from tankcal.report.survey import figures, quality, results
+from tankcal.report.workbook import papers
 from tankcal.survey import observations
 from tankcal.survey.results import Adjustment, GroupOfReadings
 from tankcal.text.words import load_words, verdict_sentences
@@ -383,7 +382,7 @@ def test_csv_files_are_the_record_in_their_units(only):
 @pytest.mark.slow
 def test_angles_are_degrees_with_residuals_in_seconds(station, tmp_path):
     _, record, _ = station
-    csv_files.write_tables(record, tmp_path)
+    outputs.write_tables(record, tmp_path)
     table = pd.read_csv(tmp_path / "residuals.csv")
     angles = table[table.kind == "direction"]
     assert set(angles.value_unit) == {"deg"}
@@ -441,7 +440,7 @@ def test_the_workbook_of_a_tank_has_the_sheets_beside_its_own(whole):
 
 
 def test_very_many_readings_are_cut_to_the_worst(only, tmp_path, monkeypatch):
-    monkeypatch.setattr(workbook.survey, "MOST_READINGS", 20)
+    monkeypatch.setattr(papers, "MOST_READINGS", 20)
     workbook.write(only[0], tmp_path / "adjustment.xlsx")
     sheet = openpyxl.load_workbook(tmp_path / "adjustment.xlsx")["Observations"]
     assert sheet.max_row == 4 + 20
@@ -455,7 +454,7 @@ def test_very_many_readings_are_cut_to_the_worst(only, tmp_path, monkeypatch):
 
 def test_of_very_many_points_the_sheet_has_the_weakest(only, tmp_path, monkeypatch):
     record = records.load(only[1] / "record.json")
-    monkeypatch.setattr(workbook.survey, "MOST_POINTS", 10)
+    monkeypatch.setattr(papers, "MOST_POINTS", 10)
     workbook.write(record, tmp_path / "cut.xlsx")
     sheet = openpyxl.load_workbook(tmp_path / "cut.xlsx")["Adjusted points"]
     names = [sheet.cell(row, 1).value for row in range(5, sheet.max_row + 1)]

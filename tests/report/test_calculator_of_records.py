@@ -10,7 +10,7 @@ from calculated_tanks import afloat, example_with_rows
 from calculator_deliveries import held_against_deliveries
 from recalculation import calculators
 
-from tankcal.report.uncertainty.sources import groups_of
+from tankcal.report.uncertainty.stated import groups_of
 from tankcal.text.words import load_words
 
 # openpyxl does not know our data bars, and says so each time

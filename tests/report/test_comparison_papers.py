@@ -16,10 +16,17 @@ from paper_words import texts_in, texts_of
 
 from tankcal.cli import main
 from tankcal.errors import InputError
-from tankcal.products.recalibration import verdict as verdicts
+from tankcal.products.recalibration import comparison as verdicts
 from tankcal.report import comparison
 from tankcal.report.comparison import ComparisonPaper, rebuild, write_comparison
-from tankcal.report.comparison.pages import correlation, delivery_rows, pages, side_rows, verdict
+from tankcal.report.comparison.paper import (
+    correlation,
+    delivery_rows,
+    pages,
+    side_rows,
+    verdict,
+    write,
+)
 from tankcal.report.comparison.tables import (
     CODES,
     MOST_ROWS,
@@ -27,7 +34,6 @@ from tankcal.report.comparison.tables import (
     waterfall_table,
     worst_row,
 )
-from tankcal.report.comparison.workbook import write
 from tankcal.text.shipped import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words
 

@@ -3,7 +3,7 @@
 import pytest
 
 from tankcal.report.paper import Paper
-from tankcal.report.tables.overrulings import sentence_of
+from tankcal.report.tables.survey import sentence_of
 
 
 @pytest.mark.parametrize(

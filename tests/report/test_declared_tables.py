@@ -13,7 +13,7 @@ from paper_pages import pages_of
 from tankcal.record.versions import RECORD
 from tankcal.report import blocks
 from tankcal.report.camera import lines_of
-from tankcal.report.outputs.csv_files import write_table
+from tankcal.report.outputs import write_table
 from tankcal.report.paper import Paper
 from tankcal.report.pdf import pdf
 from tankcal.report.tables import Column, capacity, survey, tank

@@ -15,7 +15,7 @@ from tankcal.products.exports.profiles import find_profile
 from tankcal.products.quantity.table import table_of
 from tankcal.record import record_of
 from tankcal.report.dcc import certificate_xml
-from tankcal.report.letterhead import load
+from tankcal.report.laboratory import load
 from tankcal.report.paper import Paper
 from tankcal.report.uncertainty.capacity import roof_blocks
 from tankcal.report.web import calculator_html

@@ -26,22 +26,29 @@ from tankcal.report.inspection import (
     InspectionPaper,
     rebuild,
     tables,
-    wall,
     write_inspection,
 )
 from tankcal.report.inspection import pages as report_pages
-from tankcal.report.inspection import paper as papers
-from tankcal.report.inspection.bottom import edges, points, settlement_blocks
+from tankcal.report.inspection import (
+    pages as wall,
+)
+from tankcal.report.inspection import tables as papers
 from tankcal.report.inspection.pages import (
     checks,
     counts,
+    courses,
+    departures,
+    edges,
     keep_end_together,
+    levels,
     limits,
     pages,
+    points,
     reading,
     result,
+    settlement_blocks,
+    welds,
 )
-from tankcal.report.inspection.wall import courses, departures, levels, welds
 from tankcal.report.pdf import pdf
 from tankcal.text.shipped import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words

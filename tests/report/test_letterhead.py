@@ -17,7 +17,7 @@ from test_report import pages
 from tankcal.errors import InputError, TankcalError
 from tankcal.report import blocks
 from tankcal.report.document import blocks_of
-from tankcal.report.letterhead import (
+from tankcal.report.laboratory import (
     LETTERHEAD_FILE,
     MAX_LOGO_BYTES,
     contrast_with_white,

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from test_digits import CASES
 
 from tankcal.report import blocks, workbook
-from tankcal.report.outputs.csv_files import write_tables
+from tankcal.report.outputs import write_tables
 from tankcal.report.paper import Column
 from tankcal.report.plain import PlainPaper
 from tankcal.report.web import block_html

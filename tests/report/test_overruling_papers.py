@@ -13,7 +13,7 @@ from tankcal.record import load, record_of, save
 from tankcal.record.versions import FORMAT
 from tankcal.report.paper import Paper
 from tankcal.report.papers import parts_without_content
-from tankcal.report.tables.overrulings import OVERRULINGS, sentences
+from tankcal.report.tables.survey import OVERRULINGS, sentences
 from tankcal.text.shipped import LANGUAGES
 
 TURN = np.radians(7.5)

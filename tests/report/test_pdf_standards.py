@@ -12,7 +12,7 @@ from conftest import EXAMPLE
 from tankcal.planning import load_plan, predict
 from tankcal.report import planning as planning_papers
 from tankcal.report.comparison import write_comparison
-from tankcal.report.letterhead import load
+from tankcal.report.laboratory import load
 from tankcal.report.papers import build
 from tankcal.text.shipped import DEFAULT, LANGUAGES
 

@@ -9,7 +9,7 @@ import pytest
 from paper_pages import pages_of
 
 from tankcal.messages import fill_template
-from tankcal.pipeline.tanks import corrections
+from tankcal.pipeline import tanks
 from tankcal.report import blocks
 from tankcal.report.pdf import pdf
 from tankcal.report.plain import Column, PlainPaper
@@ -26,7 +26,7 @@ def templates(language):
     """The formulas of the corrections, in English as their module says them."""
     if language != "en":
         return load_words(language)["formulas"].values()
-    nodes = ast.walk(ast.parse(inspect.getsource(corrections)))
+    nodes = ast.walk(ast.parse(inspect.getsource(tanks)))
     found = [node.value for node in nodes if isinstance(node, ast.Constant)]
     return [
         one for one in found if isinstance(one, str) and set(one) & (SIGNS - {"_"}) and " " in one

@@ -12,8 +12,7 @@ from tankcal.report import blocks
 from tankcal.report.markdown import formula, nodes
 from tankcal.report.numbers import symbol, unit
 from tankcal.report.paper import Column, Paper
-from tankcal.report.web import block_html
-from tankcal.report.web.elements import decimal_fills
+from tankcal.report.web import block_html, decimal_fills
 from tankcal.text.digits import ENGLISH, Marks
 from tankcal.text.words import load_words
 

@@ -10,11 +10,11 @@ from test_report import pages
 from tankcal.job.certificate_entries import MARKED
 from tankcal.job.contract import KEYS
 from tankcal.report import blocks, certificate, field_table, sketch
-from tankcal.report.dip_point import dip_point, dip_point_text
-from tankcal.report.letterhead import Letterhead
+from tankcal.report.laboratory import Letterhead
 from tankcal.report.numbers import degrees_of_freedom
 from tankcal.report.paper import Column, Paper
 from tankcal.report.pdf import pdf
+from tankcal.report.tables.facts import dip_point, dip_point_text
 from tankcal.report.uncertainty.stated import stated_rows
 from tankcal.text.digits import fixed
 from tankcal.text.words import load_words

@@ -31,8 +31,17 @@ from tankcal.report.plots import style as plot_style
 from tankcal.report.uncertainty import budget, method, monte_carlo, rule
 from tankcal.report.uncertainty import figures as drawn
 from tankcal.report.uncertainty.stated import stated_rows, uneven_rows
-from tankcal.tank.rules.model import DEVIATION_OF, GUARDS, RELATIVE_TO, SIDES, TANKS, UNCERTAINTY_OF
-from tankcal.tank.rules.verdict import DeviationVerdict, RuleVerdict, UncertaintyVerdict
+from tankcal.tank.rules import (
+    DEVIATION_OF,
+    GUARDS,
+    RELATIVE_TO,
+    SIDES,
+    TANKS,
+    UNCERTAINTY_OF,
+    DeviationVerdict,
+    RuleVerdict,
+    UncertaintyVerdict,
+)
 from tankcal.text.digits import NOTHING, decimals_of, decimals_of_rows, fixed
 from tankcal.text.words import input_name, load_words
 

@@ -9,7 +9,7 @@ from pypdf import PdfReader
 
 from tankcal.cli import main
 from tankcal.job.certificate_entries import MARKED, REQUIRED, missing_entries
-from tankcal.job.contract.keys import KEYS
+from tankcal.job.contract.keys import COMMON_KEYS
 from tankcal.job.starter import write_input_workbook
 from tankcal.report import certificate
 from tankcal.report.paper import Paper
@@ -26,7 +26,7 @@ def paper_of(language="en", **entries):
 
 
 def test_every_required_key_is_a_key_of_the_certificate():
-    known = {field.name for field in KEYS["certificate"]}
+    known = {field.name for field in COMMON_KEYS["certificate"]}
     assert {key for group in REQUIRED for key in group} <= known
 
 

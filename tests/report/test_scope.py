@@ -7,8 +7,14 @@ from conftest import EXAMPLE
 
 from tankcal.cli import main
 from tankcal.errors import InputError
-from tankcal.report.letterhead import LETTERHEAD_FILE, load, read_saved
-from tankcal.report.scope import find_capability, is_outside_scope, letterhead_in_scope
+from tankcal.report.laboratory import (
+    LETTERHEAD_FILE,
+    find_capability,
+    is_outside_scope,
+    letterhead_in_scope,
+    load,
+    read_saved,
+)
 from tankcal.report.verified_again import letterhead_of
 
 LABORATORY = '[laboratory]\nname = "Metrolab"\naccreditation_place = true\n'

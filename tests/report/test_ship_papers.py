@@ -11,11 +11,11 @@ from paper_words import assert_tables_have_words, cells_of_sheet
 import tankcal
 from tankcal import record as records
 from tankcal.record import record_of
-from tankcal.report import ship
 from tankcal.report.certificate import calibration
-from tankcal.report.outputs.csv_files import write_tables
+from tankcal.report.outputs import write_tables
 from tankcal.report.paper import Paper
 from tankcal.report.plain import PlainPaper
+from tankcal.report.tables import ship
 from tankcal.report.tables import ship as tables
 from tankcal.report.uncertainty.stated import stated_U_m3
 from tankcal.text.shipped import LANGUAGES

@@ -10,8 +10,7 @@ import tankcal
 from tankcal.methods.great_circles.tables import CIRCLES
 from tankcal.record import load as load_record
 from tankcal.record import read
-from tankcal.report.outputs import write
-from tankcal.report.outputs.csv_files import write_tables
+from tankcal.report.outputs import write, write_tables
 from tankcal.report.paper import Paper
 from tankcal.report.tables.facts import REFERENCES
 from tankcal.text.shipped import LANGUAGES

@@ -19,7 +19,7 @@ from tankcal.products.quantity.reading import read_tickets
 from tankcal.products.quantity.saving import document_file, ticket_file
 from tankcal.products.quantity.table import TankTable, read_table
 from tankcal.record.schema import to_plain
-from tankcal.report.letterhead import Letterhead
+from tankcal.report.laboratory import Letterhead
 from tankcal.report.ticket import TicketPaper, write_ticket
 from tankcal.report.ticket.pages import BOOKLET, comparison_text
 from tankcal.report.verification import verify

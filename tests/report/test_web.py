@@ -22,10 +22,8 @@ from tankcal.report.document import blocks_of
 from tankcal.report.exporter import HtmlExporter
 from tankcal.report.paper import Paper
 from tankcal.report.pdf import pdf
-from tankcal.report.web import page
+from tankcal.report.web import PIECE, embed_fonts, page, script_data
 from tankcal.report.web.calculator_data import BEND, calculator, sources_of, straight_rows
-from tankcal.report.web.elements import PIECE, embed_fonts
-from tankcal.report.web.packing import script_data
 from tankcal.report.web.tank_shape import tank_view
 
 

@@ -13,8 +13,8 @@ from sheet_links import is_in_index
 from xlsxwriter.worksheet import Worksheet
 
 from tankcal.report.workbook import write
+from tankcal.report.workbook.book import NumberRow, Sheet
 from tankcal.report.workbook.look import Column, _longest_number
-from tankcal.report.workbook.writer import NumberRow, Sheet
 from tankcal.text.digits import decimals_of
 from tankcal.text.words import choice_sentence, load_words, sentence, translate_record
 

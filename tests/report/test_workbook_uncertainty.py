@@ -7,7 +7,7 @@ import pytest
 from sheet_links import is_in_index
 from uncertain_job import HOSTILE, as_before, write_uncertain_record
 
-from tankcal.report.outputs.csv_files import write_tables
+from tankcal.report.outputs import write_tables
 from tankcal.report.paper import Paper
 from tankcal.report.uncertainty import method, monte_carlo, rule
 from tankcal.report.uncertainty.stated import stated_rows

@@ -11,8 +11,7 @@ from photographed_jobs import by_tape, control_of, measurements, tank_job
 
 from tankcal.calibration.influence.runs import influence
 from tankcal.calibration.parameters.analysis import analyse_job
-from tankcal.calibration.product.check import check_product
-from tankcal.calibration.product.limits import shipped_limits
+from tankcal.calibration.product.check import check_product, shipped_limits
 from tankcal.calibration.stability.comparison import compare
 from tankcal.record import camera_analyses as influence_json
 from tankcal.record import camera_analyses as product_json

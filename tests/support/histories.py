@@ -7,7 +7,7 @@ import numpy as np
 from tables_of_s1 import RADII, new_s1, rings_m3
 
 from tankcal.products.recalibration.history import DatedTable, history_of
-from tankcal.record.history import CheckInHistory, InspectionInHistory
+from tankcal.record.recalibration import CheckInHistory, InspectionInHistory
 from tankcal.record.schema import to_plain
 
 COMMON_U = 0.0002  # relative standard uncertainty of a table, common to its rows

@@ -25,8 +25,7 @@ from tankcal.record.inspection import (
     SettlementPoint,
     WeldGap,
 )
-from tankcal.record.schema import to_plain
-from tankcal.record.texts import WarningRecord
+from tankcal.record.schema import WarningRecord, to_plain
 
 HOSTILE = '=HYPERLINK("http://x.example","y") <script>alert(1)</script>'
 TYPESET = "#strong[x] $E$ \\n @ref _a_ ^b {c}"

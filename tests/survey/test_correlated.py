@@ -12,7 +12,7 @@ from scipy.special import chdtri
 
 from tankcal.adjust import CRITICAL, noncentrality
 from tankcal.survey.network import Survey, adjust
-from tankcal.survey.network.separability import alternatives
+from tankcal.survey.network.reliability import alternatives
 from tankcal.survey.observations import (
     Block,
     ControlCoordinates,

@@ -9,8 +9,8 @@ from surveyed import by_photographs
 
 from tankcal.adjust import CRITICAL
 from tankcal.survey import adjust_survey
-from tankcal.survey.network import adjust, separability
-from tankcal.survey.network.separability import alternatives
+from tankcal.survey.network import adjust, reliability
+from tankcal.survey.network.reliability import alternatives
 from tankcal.survey.network.snooping import set_use
 
 
@@ -60,11 +60,11 @@ def test_unknowns_are_solved_once_per_observation_set_aside(monkeypatch):
     found = adjust_survey(
         replace(measurements, settings=replace(measurements.settings, explain=False))
     ).adjusted
-    asked, moves_of = [], separability.moves_of
+    asked, moves_of = [], reliability.moves_of
     monkeypatch.setattr(
-        separability, "moves_of", lambda *given: asked.append(given) or moves_of(*given)
+        reliability, "moves_of", lambda *given: asked.append(given) or moves_of(*given)
     )
-    monkeypatch.setattr(separability, "WORTH", 0.0)
+    monkeypatch.setattr(reliability, "WORTH", 0.0)
     alternatives(found, "image points", 5)
     assert len(asked) == 1
 
@@ -74,12 +74,12 @@ def test_unknowns_are_solved_once_per_observation_set_aside(monkeypatch):
 def test_bound_of_the_test_leaves_out_no_alternative(seed, monkeypatch, figure):
     """Second method: without the bound, every reading that stands out is tested in full."""
     found = adjusted_with_blunders(seed)
-    monkeypatch.setattr(separability, "WORTH", 0.0)
+    monkeypatch.setattr(reliability, "WORTH", 0.0)
     rows = np.flatnonzero(found.survey.image_points.use == 0)
     bounded = [alternatives(found, "image points", int(row)) for row in rows]
-    bound, kept = separability._may_explain, []
+    bound, kept = reliability._may_explain, []
     monkeypatch.setattr(
-        separability,
+        reliability,
         "_may_explain",
         lambda v, *of: kept.append(bound(v, *of)) or np.ones(len(v), dtype=bool),
     )
@@ -90,7 +90,7 @@ def test_bound_of_the_test_leaves_out_no_alternative(seed, monkeypatch, figure):
 
 def test_bound_of_the_test_is_never_above_the_test_itself():
     """Second method: pairs of random surveys, one rejected, tested again without another one."""
-    rng, limit, left_out, kept = np.random.default_rng(5), separability.LIMITS[2], 0, 0
+    rng, limit, left_out, kept = np.random.default_rng(5), reliability.LIMITS[2], 0, 0
     for _ in range(400):
         design, y = rng.normal(size=(30, 3)), rng.normal(size=30)
         own, other, rest = slice(0, 2), slice(2, 4), slice(4, None)
@@ -110,7 +110,7 @@ def test_bound_of_the_test_is_never_above_the_test_itself():
         v = y[other] - design[other] @ x - b @ aside.back
         redundancy = 1 - np.diag(design[other] @ inverse @ design[other].T)
         shared = np.trace(b @ cofactors @ b.T)
-        may = separability._may_explain(v[None], redundancy[None], np.array([shared]), aside)[0]
+        may = reliability._may_explain(v[None], redundancy[None], np.array([shared]), aside)[0]
         inverse, x = solved(rest)
         e = y[own] - design[own] @ x
         t = e @ np.linalg.solve(np.eye(2) + design[own] @ inverse @ design[own].T, e)

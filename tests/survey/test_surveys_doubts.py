@@ -8,7 +8,7 @@ from surveyed import by_instruments, by_photographs, changed, told
 
 from tankcal.geometry.rotations import rotation_of_angles
 from tankcal.survey import adjust_survey
-from tankcal.survey.diagnosis.double_names import normalize_name
+from tankcal.survey.diagnosis.diagnoses import normalize_name
 from tankcal.survey.measurements import AdjustmentSettings
 from tankcal.survey.start.pieces import similarity
 from tankcal.survey.start_values import plan_fit

@@ -14,8 +14,7 @@ from tankcal.record.schema import to_plain
 from tankcal.survey import adjust_survey
 from tankcal.survey.measurements import Measurements
 from tankcal.survey.network import adjust
-from tankcal.survey.network.reliability import HELD, reactions
-from tankcal.survey.network.separability import alternatives
+from tankcal.survey.network.reliability import HELD, alternatives, reactions
 from tankcal.survey.network.snooping import set_use
 from tankcal.survey.readings import average_readings, contradictory_labels
 

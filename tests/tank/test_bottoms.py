@@ -6,8 +6,7 @@ from jacobians import assert_derivative
 
 from tankcal.errors import SolutionError
 from tankcal.quadrature import panels
-from tankcal.tank.bottoms import leaning_bottom, shaped_bottom, surveyed_bottom
-from tankcal.tank.terrain import Footprint
+from tankcal.tank.bottoms import Footprint, leaning_bottom, shaped_bottom, surveyed_bottom
 
 RADIUS, AREA = 6.5, np.pi * 6.5**2
 LEVELS = np.array([-0.3, -0.15, -0.149, -0.1, -0.02, 0.0, 0.02, 0.1, 0.149, 0.15, 0.3, 9.5])

@@ -7,9 +7,8 @@ from jacobians import assert_derivative
 from scipy.integrate import quad
 
 from tankcal.errors import HeightError, SolutionError
-from tankcal.tank.ellipsoids import Ellipsoid, Membrane, PressedSphere, Pressure
 from tankcal.tank.meshes import mesh_part, parse_mesh
-from tankcal.tank.solids import Sphere
+from tankcal.tank.solids import Ellipsoid, Membrane, PressedSphere, Pressure, Sphere
 
 DIPS = np.array([0.0, 1.0, 5.0, 10.0, 15.0, 20.0])
 PLATE = Membrane(0.02, 206e9)

@@ -12,7 +12,7 @@ from shapes import course_of
 from tankcal.pipeline.tanks.vertical import widen_bottom
 from tankcal.quadrature import panels
 from tankcal.tank.body import ShellPart, SolidPart
-from tankcal.tank.bottoms import leaning_bottom, shaped_bottom, surveyed_bottom
+from tankcal.tank.bottoms import Footprint, leaning_bottom, shaped_bottom, surveyed_bottom
 from tankcal.tank.budgets import Factor
 from tankcal.tank.fittings import deadwood, floating_roof
 from tankcal.tank.heads import End
@@ -20,7 +20,6 @@ from tankcal.tank.hydrostatics import liquid_head
 from tankcal.tank.meshes import closed_mesh, mesh_part
 from tankcal.tank.parts import Part
 from tankcal.tank.solids import LyingTank, Sphere
-from tankcal.tank.terrain import Footprint
 from tankcal.tank.volumes import PartAbove, ShellVolume, measured_bottom
 
 AREA = np.pi * 6.5**2

@@ -15,9 +15,16 @@ from tankcal.record.schema import to_plain
 from tankcal.record.table import rule_of
 from tankcal.tank.capacity import Capacity
 from tankcal.tank.deliveries import worst_deliveries
-from tankcal.tank.rules import TANKS, PrintedU, StatedVolume, judge
-from tankcal.tank.rules.model import DeviationLimit, UncertaintyLimit
-from tankcal.tank.rules.verdict import judge_deviation, judge_uncertainty
+from tankcal.tank.rules import (
+    TANKS,
+    DeviationLimit,
+    PrintedU,
+    StatedVolume,
+    UncertaintyLimit,
+    judge,
+    judge_deviation,
+    judge_uncertainty,
+)
 from tankcal.uncertainty import Source
 
 K95 = 1.959963984540054  # closed form: the normal quantile of 0.975

@@ -7,8 +7,13 @@ from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 from scipy.spatial.distance import cdist
 
 from tankcal.errors import SolutionError
-from tankcal.tank.bottoms import COVARIANCE_MESH, surveyed_bottom, surveyed_surface
-from tankcal.tank.terrain import Footprint, surface
+from tankcal.tank.bottoms import (
+    COVARIANCE_MESH,
+    Footprint,
+    surface,
+    surveyed_bottom,
+    surveyed_surface,
+)
 from tankcal.uncertainty import coverage_factor, effective_dof
 
 FORMS = ("cone", "flat", "buckled")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from jacobians import assert_derivative
 
-from tankcal.tank.terrain import Footprint, surface
+from tankcal.tank.bottoms import Footprint, surface
 
 ROUND = Footprint(3.0, 1.0, np.full(360, 6.5))
 

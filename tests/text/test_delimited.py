@@ -8,7 +8,7 @@ import pytest
 from tankcal.job.folder import read_csv
 from tankcal.job.tables import Log
 from tankcal.products.desk.tables import read_csv_table
-from tankcal.report.outputs.csv_files import write_rows
+from tankcal.report.outputs import write_rows
 from tankcal.text.delimited import guard_formula, unguard_formula, write_guarded
 
 HOSTILE = ["=1+1", "+1-1", "-1+1|' /C calc'!A0", "@SUM(A1)", "\t=1", "  =1", "=HYPERLINK(1)"]

@@ -14,7 +14,7 @@ from tankcal.products.desk.computing import Refusal, Run, Stopped
 from tankcal.products.desk.tables import AmbiguousNumber, text_for_display, text_for_file
 from tankcal.products.workbench import desk
 from tankcal.products.workbench.desk import Desk, open_job
-from tankcal.products.workbench.pages import warnings_page
+from tankcal.products.workbench.panels import warnings_page
 from tankcal.text.shipped import LANGUAGES
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

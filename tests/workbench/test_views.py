@@ -14,10 +14,16 @@ from tankcal.errors import InputError, Problem
 from tankcal.job.model import Overruling
 from tankcal.messages import message
 from tankcal.products.desk.result_pages import wall_page
-from tankcal.products.workbench.views import page as pages
-from tankcal.products.workbench.views import results_view
-from tankcal.products.workbench.views.page import Calculator, SavedView, parse_number
-from tankcal.products.workbench.views.panels import budget_sentences, change_budget, table_html
+from tankcal.products.workbench import views as pages
+from tankcal.products.workbench.views import (
+    Calculator,
+    SavedView,
+    budget_sentences,
+    change_budget,
+    parse_number,
+    results_view,
+    table_html,
+)
 from tankcal.record import record_of
 from tankcal.report.paper import Paper
 from tankcal.report.tables.capacity import capacity_rows, capacity_table
@@ -239,7 +245,7 @@ def heard():
 
 @pytest.fixture
 def points(widgets, english, heard):
-    from tankcal.products.workbench.views.panels import PointsPanel
+    from tankcal.products.workbench.views import PointsPanel
 
     return PointsPanel(english, lambda *given: heard.append(given))
 
@@ -283,7 +289,7 @@ def test_nothing_is_decided_about_nothing(points):
 
 
 def test_a_refusal_is_said(widgets, english):
-    from tankcal.products.workbench.views.panels import PointsPanel
+    from tankcal.products.workbench.views import PointsPanel
 
     def refuse(*_given):
         raise InputError(Problem("overrulings.csv", message("overruled_nothing", "blank <b>")))
@@ -296,7 +302,7 @@ def test_a_refusal_is_said(widgets, english):
 
 
 def test_nobody_decides_where_nobody_listens(widgets, english):
-    from tankcal.products.workbench.views.panels import PointsPanel
+    from tankcal.products.workbench.views import PointsPanel
 
     panel = PointsPanel(english, None)
     assert panel.reason not in panel.box.children
@@ -310,7 +316,7 @@ def test_the_whole_view(widgets, result, record, heard):
 
 def test_picture_and_list_look_at_the_same_point(widgets, result, english):
     pytest.importorskip("anywidget")
-    from tankcal.products.workbench.views.panels import wall_part
+    from tankcal.products.workbench.views import wall_part
 
     box = wall_part(result, english, wall_page(english), None)
     frame = box.children[1]
@@ -319,7 +325,7 @@ def test_picture_and_list_look_at_the_same_point(widgets, result, english):
 
 
 def test_sliders_of_the_budget(widgets, result, paper):
-    from tankcal.products.workbench.views.panels import BudgetPanel
+    from tankcal.products.workbench.views import BudgetPanel
 
     panel = BudgetPanel(result, paper)
     before = panel.totals.value
@@ -354,7 +360,7 @@ TICKET = {
 @pytest.fixture
 def quantity(widgets, paper):
     """Quantity panel in which the ticket was typed with the decimal mark of the language."""
-    from tankcal.products.workbench.views.panels import QuantityPanel
+    from tankcal.products.workbench.views import QuantityPanel
 
     panel = QuantityPanel(paper)
     for section, values in TICKET.items():
@@ -461,7 +467,7 @@ def test_a_slip_is_told_beside_its_field(paper, quantity):
 
 
 def test_a_form_without_entries_is_silent(widgets, paper):
-    from tankcal.products.workbench.views.panels import QuantityPanel
+    from tankcal.products.workbench.views import QuantityPanel
 
     panel = QuantityPanel(paper)
     panel.entries["closing.dip_m"].value = "4"
@@ -472,7 +478,7 @@ def test_a_form_without_entries_is_silent(widgets, paper):
 
 
 def test_without_anywidget_a_page_is_still_framed(monkeypatch, widgets, english):
-    from tankcal.products.workbench.views import panels
+    from tankcal.products.workbench import views as panels
 
     monkeypatch.setattr(panels, "find_spec", lambda name: None)
     assert "srcdoc" in panels.frame_of(wall_page(english), "wall").value

@@ -28,7 +28,7 @@ from tankcal.camera.model import PARAMETERS
 from tankcal.errors import InputError, Problem, TankcalError
 from tankcal.messages import message
 from tankcal.pipeline.chain import adjust_job
-from tankcal.survey.photographs import ELEMENTS, TURNS
+from tankcal.survey.network_of_survey import ELEMENTS, TURNS
 
 STATES = ("fixed", "weighted", "free")
 SAME = 1e-5  # largest relative rounding difference of formats or pixels: 0.05 px of 4608

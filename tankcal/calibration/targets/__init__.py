@@ -15,24 +15,22 @@ import numpy as np
 
 from tankcal.calibration.targets.circles import eccentricity_px, read_circles
 from tankcal.calibration.targets.coded import read_coded
-from tankcal.calibration.targets.pictures import (
-    ENCODINGS,
-    load_dictionary,
-    opencv,
-    photo_name,
-    read_picture,
-    target_image,
-)
 from tankcal.calibration.targets.results import (
     CORNERS,
+    ENCODINGS,
     REASONS,
     Circle,
     Marker,
     PhotoTargets,
     RefusedTarget,
+    load_dictionary,
     match_circles_to_places,
+    opencv,
+    photo_name,
     read_names,
+    read_picture,
     read_places,
+    target_image,
     warn_of_unused,
 )
 from tankcal.errors import InputError, Problem, reason_of

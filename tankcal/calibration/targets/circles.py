@@ -11,8 +11,7 @@ import numpy as np
 import scipy
 from scipy.special import ndtr
 
-from tankcal.calibration.targets.pictures import opencv
-from tankcal.calibration.targets.results import Circle, PhotoTargets, RefusedTarget
+from tankcal.calibration.targets.results import Circle, PhotoTargets, RefusedTarget, opencv
 
 WINDOWS = (0.03, 0.1, 0.3)  # windows of the local threshold, as shares of the smaller side
 THRESHOLD_GREY = 7  # local threshold, grey values

@@ -27,8 +27,13 @@ import numpy as np
 import scipy
 from scipy.special import ndtr
 
-from tankcal.calibration.targets.pictures import load_dictionary, opencv
-from tankcal.calibration.targets.results import Marker, PhotoTargets, RefusedTarget
+from tankcal.calibration.targets.results import (
+    Marker,
+    PhotoTargets,
+    RefusedTarget,
+    load_dictionary,
+    opencv,
+)
 
 CELL_PX = 2.5  # least mean width of a cell, px
 LEAST_CLARITY = 0.7  # least correlation of the cells with the code

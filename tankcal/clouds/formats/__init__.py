@@ -1,23 +1,23 @@
 """File formats of scanners, one module per format: check of the header, reading of the points."""
 
 from tankcal.clouds.contents import WHOLE
-from tankcal.clouds.formats import columns, counted_text, e57, las, ply
+from tankcal.clouds.formats import columns, e57, las, lines, ply
 from tankcal.clouds.formats.files import find_format
 
 _DESCRIBE = {
     "las": las.describe,
     "e57": e57.describe,
     "ply": ply.describe,
-    "ptx": counted_text.describe_ptx,
-    "pts": counted_text.describe_pts,
+    "ptx": lines.describe_ptx,
+    "pts": lines.describe_pts,
     "xyz": columns.describe,
 }
 _PIECES = {
     "las": las.pieces,
     "e57": e57.pieces,
     "ply": ply.pieces,
-    "ptx": counted_text.ptx_pieces,
-    "pts": counted_text.pts_pieces,
+    "ptx": lines.ptx_pieces,
+    "pts": lines.pts_pieces,
     "xyz": columns.pieces,
 }
 _SHARES = {"las": las.shares, "e57": e57.shares, "ply": ply.shares, "xyz": columns.shares}

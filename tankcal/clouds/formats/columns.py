@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from tankcal.clouds.contents import WHOLE, CloudPiece, ScanHeader
-from tankcal.clouds.formats.counted_text import is_pts, is_ptx
 from tankcal.clouds.formats.files import Piece, count_mismatch, no_points
 from tankcal.clouds.formats.lines import (
     BLOCK,
@@ -16,6 +15,8 @@ from tankcal.clouds.formats.lines import (
     Lines,
     count_lines,
     count_rows,
+    is_pts,
+    is_ptx,
     parse_rows,
     printable_start,
     whole_number,

@@ -14,13 +14,13 @@ import scipy.sparse
 
 from tankcal.adjust import SD_OVER_MEDIAN
 from tankcal.clouds.inside.bottom import (
+    STACK_M,
     BottomPoints,
     CloudBottom,
     bottom_points,
     extend_level,
     find_cloud_bottom,
 )
-from tankcal.clouds.inside.floor_cells import STACK_M
 from tankcal.clouds.wall.passes import Passes, PointSample
 from tankcal.errors import SolutionError
 from tankcal.geometry.circles import fit_circle

@@ -31,8 +31,7 @@ from tankcal.gum.monte_carlo.goal import (
     verdict,
 )
 from tankcal.gum.monte_carlo.inputs import inputs_of, sobol_points
-from tankcal.gum.monte_carlo.linear import linear_law, shapes_of
-from tankcal.gum.monte_carlo.quadratic import QuadraticRows, table_estimates
+from tankcal.gum.monte_carlo.quadratic import QuadraticRows, linear_law, shapes_of, table_estimates
 
 __all__ = [
     "ESTIMATES",

@@ -18,16 +18,17 @@ from tankcal.job.checks.plausible import check_plausible
 from tankcal.job.checks.settings import check_settings, check_steps, check_tiny_sds
 from tankcal.job.checks.survey import check_survey
 from tankcal.job.contract.bottom import check_bottom
-from tankcal.job.contract.correlations import check_correlations
-from tankcal.job.contract.courses import check_courses
-from tankcal.job.contract.deadwood import check_deadwood
+from tankcal.job.contract.courses import check_courses, check_welds
+from tankcal.job.contract.fittings import check_deadwood, check_roof
 from tankcal.job.contract.lying import check_horizontal, check_sphere
 from tankcal.job.contract.overrulings import check_overrulings
-from tankcal.job.contract.roof import check_roof
-from tankcal.job.contract.stated import check_levels, check_stated
 from tankcal.job.contract.top import check_top
-from tankcal.job.contract.uncertainty import check_inputs
-from tankcal.job.contract.welds import check_welds
+from tankcal.job.contract.uncertainty import (
+    check_correlations,
+    check_inputs,
+    check_levels,
+    check_stated,
+)
 from tankcal.job.entries import kind_of
 from tankcal.methods.base import methods_for
 

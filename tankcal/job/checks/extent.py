@@ -148,7 +148,7 @@ def _of_vertical(values, bottom):
         lowest += [z - zero for z in bottom.of("z_m") if z is not None]
         lowest += [level for level in bottom.of("level_m") if level is not None]
     if values["bottom"]["form"] == OF_CLOUD and diameter is not None:
-        from tankcal.clouds.inside.floor_cells import floor_reach
+        from tankcal.clouds.inside.bottom import floor_reach
 
         lowest.append(
             shell_z - zero - floor_reach(diameter / 2)

@@ -6,28 +6,23 @@ of `docs/job-format.md` (`make job-format`) are generated from these lists.
 
 from tankcal.job.contract import (
     bottom,
-    correlations,
     courses,
-    deadwood,
+    fittings,
     overrulings,
     registers,
-    roof,
     ship,
-    stated,
     top,
     uncertainty,
-    welds,
 )
-from tankcal.job.contract.keys import KEYS as COMMON_KEYS
+from tankcal.job.contract.keys import COMMON_KEYS, PART_KEYS
 from tankcal.job.contract.lying import KEYS as LYING_KEYS
 from tankcal.job.contract.observations import COLUMNS as SURVEY_COLUMNS
 from tankcal.job.contract.observations import SURVEYS as ADJUSTED_SURVEYS
-from tankcal.job.contract.parts import KEYS as PART_KEYS
 from tankcal.job.contract.registers import OF_PHOTOS, REGISTER_KEYS, REGISTERS_OF_SURVEY
-from tankcal.job.contract.shorthand import KINDS
 from tankcal.job.contract.uncertainty import INPUTS
+from tankcal.job.fields import KINDS
 from tankcal.methods.base import methods
-from tankcal.text.form_words import NOTES
+from tankcal.text.words import NOTES
 
 SECTIONS = (
     *("tank", "survey", "datum", "table", "horizontal", "sphere", "mesh", "ship"),
@@ -37,12 +32,19 @@ SECTIONS = (
     *("adjustment", "adjustment.camera", "certificate"),
     "csv",
 )
-_TABLES = (courses, welds, bottom, deadwood, uncertainty, correlations, stated)
-COLUMNS = {table.__name__.rpartition(".")[2]: table.COLUMNS for table in _TABLES}
+COLUMNS = {
+    "courses": courses.COLUMNS,
+    "welds": courses.WELD_COLUMNS,
+    "bottom": bottom.COLUMNS,
+    "deadwood": fittings.COLUMNS,
+    "uncertainty": uncertainty.COLUMNS,
+    "correlations": uncertainty.CORRELATION_COLUMNS,
+    "stated": uncertainty.STATED_COLUMNS,
+}
 COLUMNS |= registers.COLUMNS
 _KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS
-_KEYS |= {"bottom": bottom.KEYS, "top": top.KEYS, "roof": roof.KEYS, "ship": ship.KEYS}
-_KEYS["levels"] = stated.KEYS
+_KEYS |= {"bottom": bottom.KEYS, "top": top.KEYS, "roof": fittings.KEYS, "ship": ship.KEYS}
+_KEYS["levels"] = uncertainty.KEYS
 for _method in methods():
     COLUMNS |= _method.columns()
     REGISTER_KEYS |= _method.register_fields()

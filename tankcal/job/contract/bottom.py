@@ -4,8 +4,7 @@ import numpy as np
 
 from tankcal.job.checking import has_rows, is_not_given, places_of, tell, zero_z
 from tankcal.job.contract.ends import check_radii, depth_of_head, torispherical_keys
-from tankcal.job.contract.shorthand import VERTICAL, choice, number
-from tankcal.job.fields import Field
+from tankcal.job.fields import VERTICAL, Field, choice, number
 from tankcal.messages import message
 from tankcal.tank.tips import FORMS as TIPS
 

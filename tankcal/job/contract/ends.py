@@ -2,7 +2,7 @@
 
 from tankcal.errors import SolutionError
 from tankcal.job.checking import is_not_given, tell
-from tankcal.job.contract.shorthand import choice, positive
+from tankcal.job.fields import choice, positive
 from tankcal.messages import message
 from tankcal.tank.heads import KINDS, STANDARDS, End, depth_of, standard_end
 

@@ -2,7 +2,7 @@
 
 from tankcal.job.checking import is_not_given, missing_beside, settings_place, tell
 from tankcal.job.contract.ends import HORIZONTAL_ONLY, check_end, end_keys
-from tankcal.job.contract.shorthand import choice, number, positive
+from tankcal.job.fields import choice, number, positive
 from tankcal.job.plausibility import STRONG_ROLL_DEG
 from tankcal.messages import message
 

@@ -6,8 +6,7 @@ or a reading of a survey network by its table and row.
 
 from tankcal.job.checking import has_rows
 from tankcal.job.contract.observations import COLUMNS as OF_SURVEYS
-from tankcal.job.contract.shorthand import choice, number
-from tankcal.job.fields import Field
+from tankcal.job.fields import Field, choice, number
 from tankcal.messages import message
 from tankcal.methods.base import methods
 

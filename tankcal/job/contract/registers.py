@@ -2,8 +2,7 @@
 
 from tankcal.camera.comparator import KINDS as TRANSFORMATIONS
 from tankcal.camera.model import AFFINITIES, CONVENTIONS
-from tankcal.job.contract.shorthand import FREE, number
-from tankcal.job.fields import USE, Field, angle_fields
+from tankcal.job.fields import FREE, USE, Field, angle_fields, number
 from tankcal.survey.network.survey import STATES
 
 USUAL_INCIDENCE_MM = 1.0  # default standard uncertainty of the bias at 60 degrees incidence, mm

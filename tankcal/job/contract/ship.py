@@ -6,8 +6,7 @@ from math import hypot, radians, tan
 import numpy as np
 
 from tankcal.job.checking import has_rows, is_not_given, missing_beside, tell
-from tankcal.job.contract.shorthand import number, positive
-from tankcal.job.fields import Field
+from tankcal.job.fields import Field, number, positive
 from tankcal.messages import message
 
 MESH_ONLY = ("mesh",)

@@ -9,7 +9,7 @@ from tankcal.job.contract.ends import (
     too_deep,
     torispherical_keys,
 )
-from tankcal.job.contract.shorthand import VERTICAL, choice, positive
+from tankcal.job.fields import VERTICAL, choice, positive
 from tankcal.messages import message
 
 KEYS = (

@@ -1,21 +1,24 @@
-"""Inputs of uncertainty.csv, values assumed for undeclared inputs, columns and checks."""
+"""Columns of uncertainty.csv, correlations.csv and stated.csv, with their checks."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from math import degrees, pi
 
-from tankcal.gum.distributions import FAMILIES, expanded, within
-from tankcal.job.checking import refuse_repeated
-from tankcal.job.contract.shorthand import (
+from tankcal.gum.distributions import FAMILIES, Normal, expanded, within
+from tankcal.job.checking import UNIT_FACTOR, refuse_repeated, tell
+from tankcal.job.fields import (
     KINDS,
     LOADED,
     STRAPPED,
     VERTICAL,
     WITH_POINTS,
+    Field,
     choice,
     number,
+    positive,
 )
-from tankcal.job.fields import Field
 from tankcal.messages import message
+from tankcal.uncertainty import Input, Inputs
 
 AS_READ = ("standard", "half_width", "expanded", "scale", "sd")  # meanings of u
 
@@ -410,3 +413,212 @@ def _check_other(u_is, name):
                 normal=NORMAL,
             ),
         )
+
+
+CORRELATED = tuple(name for name, declarable in INPUTS.items() if declarable.correlates)
+
+CORRELATION_COLUMNS = (
+    choice("input", "an input of uncertainty.csv", CORRELATED, required=True),
+    choice("with", "another input, correlated with the first", CORRELATED, required=True),
+    number("r", "coefficient of correlation of the two inputs", -1, 1, required=True),
+)
+
+
+def check_correlations(table, inputs, raw, log):
+    """Check that each pair is declared once and that the correlation matrix is valid.
+
+    Parameters
+    ----------
+    table : ColumnValues
+        Rows of correlations.csv.
+    inputs : ColumnValues or None
+        Rows of uncertainty.csv; None if missing or unreadable.
+    raw, log
+        Raw job, and log of its problems.
+    """
+    before = len(log.problems)
+    known = _declared(inputs, raw)
+    pairs, first_row = {}, {}
+    for row, first, second, r in zip(
+        table.rows, *map(table.of, ("input", "with", "r")), strict=True
+    ):
+        for column, name in (("input", first), ("with", second)):
+            if None not in (known, name) and name not in known:
+                expected = message(
+                    "correlation_unknown",
+                    "found {name}; expected an input of {of}",
+                    name=name,
+                    of=raw.file_of("uncertainty"),
+                )
+                log.problem(table.file, expected, row, column)
+        if first is not None and first == second:
+            expected = message(
+                "correlation_with_itself", "found {one} again; expected another input", one=first
+            )
+            log.problem(table.file, expected, row, "with")
+        pair = frozenset((first, second))
+        if None not in pair and pair in first_row:
+            expected = message(
+                "correlation_twice",
+                "{one} and {other} are already in row {first_row}; expected once",
+                one=first,
+                other=second,
+                first_row=first_row[pair],
+            )
+            log.problem(table.file, expected, row, "with")
+        first_row.setdefault(pair, row)
+        pairs[first, second] = r
+    if len(log.problems) == before and not (
+        table.skipped or None in [*(name for pair in pairs for name in pair), *pairs.values()]
+    ):
+        _check_together(table, pairs, log)
+
+
+def _declared(inputs, raw):
+    """Return the names of the declared inputs; None if some of them could not be read."""
+    if inputs is None:
+        is_there = "uncertainty" in raw.tables
+        return None if is_there else ()
+    names = inputs.of("input")
+    return None if inputs.skipped or None in names else names
+
+
+def _check_together(table, pairs, log):
+    """Check that the matrix of all coefficients is positive semidefinite."""
+    names = dict.fromkeys(name for pair in pairs for name in pair)
+    try:
+        Inputs([Input(name, Normal(1.0)) for name in names], pairs)
+    except ValueError as error:
+        expected = message(
+            "correlations_impossible",
+            "{error}; expected coefficients that are possible together",
+            error=str(error),
+        )
+        log.problem(table.file, expected, None, "r")
+
+
+STATED_COLUMNS = (
+    positive(
+        "high_m",
+        "dip from the table's zero, metres; the report states its volume, uncertainty and budget",
+        100,
+        required=True,
+    ),
+    number("low_m", "for a delivery: dip at its end, metres; blank: volume below high_m", 0, 100),
+    positive(
+        "volume_m3",
+        "volume stated by an earlier table or a contract, cubic metres; for decision rules that"
+        " limit deviations",
+        1e6,
+    ),
+    Field("note", "text", "description of the volume"),
+)
+_ROUNDING_M = 1e-9  # tolerance of comparisons
+_MOST_M = 100
+KEYS = (
+    positive("full_m", "dip of the full tank, such as the overflow, metres", _MOST_M),
+    positive("maximum_m", "dip of the safe fill, metres", _MOST_M),
+    positive("minimum_m", "lowest dip in operation, metres", _MOST_M),
+    positive("pump_suction_m", "lowest dip that can be pumped, metres", _MOST_M),
+)
+_FROM_THE_TOP = tuple(key.name for key in KEYS)
+
+
+def check_stated(table, extent, log):
+    """Check that dips lie within the tank, pairs are unique, and volumes are in cubic metres."""
+    first_row = {}
+    columns = (table.of(name) for name in ("high_m", "low_m", "volume_m3"))
+    for row, high, low, volume in zip(table.rows, *columns, strict=True):
+        _check_within(table, row, high, low, extent, log)
+        if high is None:
+            continue
+        if low is not None and low >= high:
+            expected = message(
+                "stated_upside_down",
+                "found {low:g}; expected a dip below high_m = {high:g}",
+                low=low,
+                high=high,
+            )
+            log.problem(table.file, expected, row, "low_m")
+        elif (high, low) in first_row:
+            expected = message(
+                "stated_twice",
+                "this dip is already in row {first_row}; expected once",
+                first_row=first_row[high, low],
+            )
+            log.problem(table.file, expected, row, "high_m")
+        elif volume is not None:
+            _check_volume(table, row, high, low, volume, extent, log)
+        first_row.setdefault((high, low), row)
+
+
+def _check_within(table, row, high, low, extent, log):
+    """Check that the dips do not exceed the top of the tank."""
+    for column, dip in (("high_m", high), ("low_m", low)):
+        expected = dip_above_top(dip, extent)
+        if expected:
+            log.problem(table.file, expected, row, column)
+
+
+def dip_above_top(dip, extent):
+    """Return the message that a dip exceeds the top of the tank; "" if not, or if unknown."""
+    top = extent.height_m if extent.top_m is None else extent.top_m
+    if None in (dip, top) or dip <= top + _ROUNDING_M:
+        return ""
+    return message(
+        "stated_above_top",
+        "found {dip:g}; expected at most {top:.5g}, the top of the tank, in metres",
+        dip=dip,
+        top=top,
+    )
+
+
+def _check_volume(table, row, high, low, volume, extent, log):
+    """Refuse volumes far larger than the tank or the delivery, which are in another unit."""
+    height = extent.height_m if low is None else high - low
+    if None in (height, extent.area_m2):
+        return
+    full = extent.area_m2 * height
+    if volume > UNIT_FACTOR * full:
+        expected = message(
+            "stated_too_much",
+            "found {volume:g}; the whole tank holds about {full:.4g} m3, expected m3: is it "
+            "in litres?",
+            volume=volume,
+            full=full,
+        )
+        if low is not None:
+            expected = message(
+                "delivered_too_much",
+                "found {volume:g}; the tank between low_m and high_m holds about {full:.4g} "
+                "m3, expected m3: is it in litres?",
+                volume=volume,
+                full=full,
+            )
+        log.problem(table.file, expected, row, "volume_m3")
+
+
+# ---- keys of [levels], the operating levels of a tank, and checks of their order
+
+
+def check_levels(levels, extent, raw, log):
+    """Check that the levels lie within the tank, in their order.
+
+    The lowest dip in operation may be the lowest that can be pumped, and the safe fill may be the
+    full tank. The maximum must be above both lower levels, because volumes between them are stated.
+    """
+    given = [(name, levels[name]) for name in _FROM_THE_TOP if levels[name] is not None]
+    for name, dip in given:
+        expected = dip_above_top(dip, extent)
+        if expected:
+            tell(log.problem, raw, "levels", name, expected)
+    for (name, dip), (lower, low) in pairwise(given):
+        if dip < low or (dip == low and name == "maximum_m"):
+            expected = message(
+                "level_below_lower_level",
+                "found {level:g}; expected a dip above {lower} = {low:g}",
+                level=dip,
+                lower=lower,
+                low=low,
+            )
+            tell(log.problem, raw, "levels", name, expected)

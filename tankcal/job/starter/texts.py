@@ -10,10 +10,9 @@ from tankcal.job.contract import COLUMNS, KEYS, REGISTER_KEYS
 from tankcal.job.fields import MAX_TEXT
 from tankcal.methods.base import methods
 from tankcal.text.digits import shortest
-from tankcal.text.form_words import word_of
 from tankcal.text.naming import MAX_NAME, NUMBER, split_unit
 from tankcal.text.shipped import DEFAULT
-from tankcal.text.words import load_words, marks_of
+from tankcal.text.words import load_words, marks_of, word_of
 
 
 def is_number(text):

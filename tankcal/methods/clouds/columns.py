@@ -1,7 +1,6 @@
 """Keys of clouds.toml, with a section for each scanner file, and the table of scan targets."""
 
-from tankcal.job.contract.shorthand import FREE, WITH_POINTS, choice, number, positive
-from tankcal.job.fields import SURFACES, Field
+from tankcal.job.fields import FREE, SURFACES, WITH_POINTS, Field, choice, number, positive
 from tankcal.units import FOOT_M, INCH_M, US_SURVEY_FOOT_M
 
 UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": FOOT_M, "us_ft": US_SURVEY_FOOT_M, "in": INCH_M}

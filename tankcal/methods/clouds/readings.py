@@ -11,8 +11,8 @@ from tankcal.job.checking import has_rows, is_not_given, missing_beside, name_tw
 from tankcal.job.checks.extent import has_survey, sights_given, tells_by_tape
 from tankcal.job.contract.bottom import OF_CLOUD
 from tankcal.job.contract.registers import USUAL_INCIDENCE_MM
-from tankcal.job.contract.shorthand import FREE
 from tankcal.job.entries import kind_of
+from tankcal.job.fields import FREE
 from tankcal.job.tables import unreadable_file
 from tankcal.messages import message
 from tankcal.methods.clouds.columns import (

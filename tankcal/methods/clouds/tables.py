@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from tankcal.report.tables import sights
+from tankcal.report.tables import table
 from tankcal.report.tables.table import Column, Table
 from tankcal.text.digits import LITRE_DECIMALS
 
@@ -118,7 +118,7 @@ SCANNERS = Table(
 )
 
 SHARED = replace(
-    sights.SHARED.but(
+    table.SHARED.but(
         instrument={"heading": "cloud_scanner", "sheet": True},
         what={"heading": "cloud_what_shared", "sheet": True},
     ),

@@ -38,8 +38,7 @@ from tankcal.pipeline.read_wall import (
 from tankcal.pipeline.wall_straps import AreaTerm
 from tankcal.survey.strapping import ReducedStrap, reduce_straps, tapes_used
 from tankcal.tank.budgets import Factor
-from tankcal.tank.ellipsoids import Ellipsoid
-from tankcal.tank.solids import SurveyedForm, node_levels
+from tankcal.tank.solids import Ellipsoid, SurveyedForm, node_levels
 from tankcal.uncertainty import factor_of
 from tankcal.units import FULL_TURN
 

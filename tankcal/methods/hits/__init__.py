@@ -101,6 +101,6 @@ class HitsMethod(Method):
         return [("hits", "hits_subtitle", shown)]
 
     def certificates(self, saved):
-        from tankcal.report.tables.sights import certificates_of_setups
+        from tankcal.report.tables.table import certificates_of_setups
 
         return certificates_of_setups(saved["setups"])

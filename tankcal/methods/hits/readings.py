@@ -6,8 +6,13 @@ import numpy as np
 
 from tankcal.job.checking import has_rows, refuse_repeated, tell_missing
 from tankcal.job.checks.extent import has_survey, tells_by_tape
-from tankcal.job.checks.survey.files import SurveyFiles, refuse_undefined
-from tankcal.job.checks.survey.readings import check_angle, check_correction, warn_copies
+from tankcal.job.checks.survey.readings import (
+    SurveyFiles,
+    check_angle,
+    check_correction,
+    refuse_undefined,
+    warn_copies,
+)
 from tankcal.job.checks.tapes import refuse_others, tapes_of
 from tankcal.job.contract.registers import FREE, USUAL_INCIDENCE_MM
 from tankcal.job.structure import angle_in_rad

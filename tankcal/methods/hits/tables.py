@@ -1,7 +1,7 @@
 """Tables of wall hits: set-ups, common errors, rings, control targets, incidence."""
 
-from tankcal.report.tables import sights
-from tankcal.report.tables.sights import (
+from tankcal.report.tables import table
+from tankcal.report.tables.table import (
     CHECKS,
     COURSE,
     DEPARTURE,
@@ -10,9 +10,10 @@ from tankcal.report.tables.sights import (
     PLACE,
     ROW,
     SETUP,
+    Column,
+    Table,
     counts_of,
 )
-from tankcal.report.tables.table import Column, Table
 
 # ---- tables of hits
 
@@ -30,7 +31,7 @@ SETUPS = Table(
     rows=lambda record: record["hits"]["setups"],
 )  # fmt: skip
 
-SHARED = sights.SHARED  # also the basis of a table of clouds
+SHARED = table.SHARED  # also the basis of a table of clouds
 
 RINGS = Table(
     "hit_rings",

@@ -70,6 +70,6 @@ class InsideHitsMethod(Method):
         return [("hits", "inside_hits_subtitle", shown)]
 
     def certificates(self, saved):
-        from tankcal.report.tables.sights import certificates_of_setups
+        from tankcal.report.tables.table import certificates_of_setups
 
         return certificates_of_setups(saved["setups"])

@@ -1,8 +1,7 @@
 """Tables of wall hits inside horizontal tanks and spheres: set-ups, incidence, compared hits."""
 
 from tankcal.methods.hits import tables as of_upright_tanks
-from tankcal.report.tables.sights import DEPARTURE, ROW, SETUP
-from tankcal.report.tables.table import Table
+from tankcal.report.tables.table import DEPARTURE, ROW, SETUP, Table
 
 SETUPS = Table(
     "hit_setups",

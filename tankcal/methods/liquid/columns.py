@@ -1,7 +1,6 @@
 """Keys of meters.toml and [liquid], and columns of liquid.csv, for calibration with liquid."""
 
-from tankcal.job.contract.shorthand import VERTICAL, choice, number, positive
-from tankcal.job.fields import NOTE, Field
+from tankcal.job.fields import NOTE, VERTICAL, Field, choice, number, positive
 
 JOINT, ALONE, GEOMETRY = TABLES = ("joint", "liquid", "geometry")  # which table is printed
 EXPANSION_SHARE = 0.05  # default relative standard uncertainty of the liquid's expansion

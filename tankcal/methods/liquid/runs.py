@@ -7,7 +7,7 @@ import numpy as np
 
 from tankcal.job.checking import UNIT_FACTOR
 from tankcal.job.checks.extent import volume_by_sizes
-from tankcal.job.checks.survey.files import tell_rows
+from tankcal.job.checks.survey.readings import tell_rows
 from tankcal.messages import message
 from tankcal.methods.liquid.columns import TEMPERATURES
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from tankcal.gum.coverage import coverage_factor
-from tankcal.record.choices import bottom_choice, roof_choice, top_choice
 from tankcal.record.schema import Finite, Saved, fill_from, key
+from tankcal.record.table import bottom_choice, roof_choice, top_choice
 
 
 class MeterUsed(Saved):

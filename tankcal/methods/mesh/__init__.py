@@ -29,7 +29,7 @@ class MeshMethod(Method):
         return useless_inputs_of_ship(values)
 
     def read(self, values, tables, registers, raw):
-        from tankcal.job.contract.parts import MESH_UNITS_M
+        from tankcal.job.contract.keys import MESH_UNITS_M
         from tankcal.job.model import Mesh
 
         name = values["mesh"]["file"]

@@ -7,8 +7,7 @@ import numpy as np
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.pipeline.tanks.common import is_warmed, thermal_scale
-from tankcal.pipeline.tanks.solid import solid_body
+from tankcal.pipeline.tanks.solid import is_warmed, solid_body, thermal_scale
 from tankcal.tank.body import SolidPart
 from tankcal.tank.meshes import holds, mesh_part
 from tankcal.tank.ships import FULL, Pipe, corrections_of, in_ship_frame, piped_mesh

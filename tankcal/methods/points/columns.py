@@ -1,7 +1,6 @@
 """Columns of points.csv."""
 
-from tankcal.job.contract.shorthand import number, positive
-from tankcal.job.fields import Field
+from tankcal.job.fields import Field, number, positive
 
 
 def _sd(axis):

@@ -1,7 +1,6 @@
 """Former radii of a shell (radii.csv, [radii]) and their possible change since then ([change])."""
 
-from tankcal.job.contract.shorthand import VERTICAL, choice, number
-from tankcal.job.fields import Field
+from tankcal.job.fields import VERTICAL, Field, choice, number
 
 SOURCES = TABLE, RECORD, DECLARED = ("table", "record", "declared")  # sources of the radii
 MOST_MM = 1000  # largest uncertainty of a radius

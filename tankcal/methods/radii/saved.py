@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tankcal.record.choices import bottom_choice, roof_choice, top_choice
 from tankcal.record.schema import Saved, key
+from tankcal.record.table import bottom_choice, roof_choice, top_choice
 
 
 class CourseByRadius(Saved):

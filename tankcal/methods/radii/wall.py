@@ -39,9 +39,8 @@ from tankcal.job.model import Bottom
 from tankcal.messages import message
 from tankcal.methods.strapping.wall import StrappedWall
 from tankcal.pipeline.tanks import body_of, shell_zero
-from tankcal.pipeline.taped_wall import UprightAxis
 from tankcal.pipeline.wall.finding import joints_of
-from tankcal.pipeline.wall_straps import told_courses
+from tankcal.pipeline.wall_straps import UprightAxis, told_courses
 from tankcal.tank.budgets import Factor
 from tankcal.uncertainty import factor_of
 

@@ -42,9 +42,14 @@ from tankcal.pipeline.checks.size import (
 )
 from tankcal.pipeline.checks.survey import limits_of
 from tankcal.pipeline.read_wall import names_of, readings_of_straps
-from tankcal.pipeline.tanks.common import factor_of_unseen, inside_end, is_warmed, thermal_scale
-from tankcal.pipeline.taped_wall import TapedWall, adjust_readings, exchanged_courses
-from tankcal.pipeline.wall_straps import AreaTerm, gauged_plates
+from tankcal.pipeline.tanks.solid import factor_of_unseen, inside_end, is_warmed, thermal_scale
+from tankcal.pipeline.wall_straps import (
+    AreaTerm,
+    TapedWall,
+    adjust_readings,
+    exchanged_courses,
+    gauged_plates,
+)
 from tankcal.quadrature import panels
 from tankcal.survey.strapping import reduce_straps, tapes_used
 from tankcal.tank.body import SolidPart

@@ -1,7 +1,6 @@
 """Tables and keys of strapping: circumferences, obstructions, plate thicknesses."""
 
-from tankcal.job.contract.shorthand import LYING, STRAPPED, VERTICAL
-from tankcal.job.fields import NOTE, USE, Field, readings_by_tape
+from tankcal.job.fields import LYING, NOTE, STRAPPED, USE, VERTICAL, Field, readings_by_tape
 from tankcal.survey.strapping import KINDS
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from tankcal.record.choices import bottom_choice, roof_choice, top_choice
 from tankcal.record.schema import Finite, Saved, key
 from tankcal.record.survey import radius_sd, shell_by_survey
+from tankcal.record.table import bottom_choice, roof_choice, top_choice
 from tankcal.units import FULL_TURN
 
 

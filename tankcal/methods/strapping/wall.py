@@ -21,9 +21,16 @@ from tankcal.pipeline.read_wall import (
     readings_of_untold,
 )
 from tankcal.pipeline.tanks import insets_of, shell_zero
-from tankcal.pipeline.taped_wall import TapedWall, UprightAxis, adjust_readings
 from tankcal.pipeline.wall.finding import joints_of
-from tankcal.pipeline.wall_straps import AreaTerm, gauged_plates, told_courses, typical_shape_m
+from tankcal.pipeline.wall_straps import (
+    AreaTerm,
+    TapedWall,
+    UprightAxis,
+    adjust_readings,
+    gauged_plates,
+    told_courses,
+    typical_shape_m,
+)
 from tankcal.survey.strapping import reduce_straps, tapes_used
 
 

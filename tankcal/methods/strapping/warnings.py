@@ -25,7 +25,7 @@ from tankcal.pipeline.checks.size import (
 )
 from tankcal.pipeline.checks.survey import limit_at, limits_of
 from tankcal.pipeline.read_wall import FORMER
-from tankcal.pipeline.taped_wall import course_apart, exchanged_courses
+from tankcal.pipeline.wall_straps import course_apart, exchanged_courses
 from tankcal.units import STANDARD_GRAVITY
 
 TAPE_CHECKS_FILE, TAPES, COMPARED = "circumferences.csv", "instruments.toml", "tape_checks.csv"

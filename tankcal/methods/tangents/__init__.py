@@ -110,6 +110,6 @@ class TangentsMethod(Method):
         return [("tangents", "tangents_subtitle", [(table.name, table) for table in tables])]
 
     def certificates(self, saved):
-        from tankcal.report.tables.sights import certificates_of_setups
+        from tankcal.report.tables.table import certificates_of_setups
 
         return certificates_of_setups(saved["setups"])

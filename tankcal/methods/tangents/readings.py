@@ -4,8 +4,12 @@ import numpy as np
 
 from tankcal.job.checking import has_rows, tell
 from tankcal.job.checks.extent import has_survey
-from tankcal.job.checks.survey.files import SurveyFiles, refuse_undefined
-from tankcal.job.checks.survey.readings import check_angle, warn_copies
+from tankcal.job.checks.survey.readings import (
+    SurveyFiles,
+    check_angle,
+    refuse_undefined,
+    warn_copies,
+)
 from tankcal.job.checks.tapes import check_levels, refuse_others
 from tankcal.job.measuring import setups_of
 from tankcal.job.structure import angle_in_rad

@@ -1,6 +1,6 @@
 """Tables of tangents: set-ups, levels with perimeter and area, and all sights."""
 
-from tankcal.report.tables.sights import (
+from tankcal.report.tables.table import (
     CHECKS,
     COURSE,
     DEPARTURE,
@@ -9,9 +9,10 @@ from tankcal.report.tables.sights import (
     PLACE,
     ROW,
     SETUP,
+    Column,
+    Table,
     counts_of,
 )
-from tankcal.report.tables.table import Column, Table
 
 _W = Column("w", decimals=2, heading="tangent_w", sheet="tangent_w")
 _COUNTS = counts_of("tangents")

@@ -21,8 +21,8 @@ import numpy as np
 from scipy.special import chdtr
 
 from tankcal.errors import Problem
+from tankcal.geometry.field.amplitudes import bartlett
 from tankcal.geometry.field.components import COMPONENTS
-from tankcal.geometry.field.section_noise import bartlett
 from tankcal.messages import list_some, message
 from tankcal.methods.base import given_methods, is_size_measured
 from tankcal.pipeline.checks.size import (

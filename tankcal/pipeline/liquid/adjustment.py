@@ -19,14 +19,7 @@ import numpy as np
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import message
-from tankcal.pipeline.liquid.body import Known
-from tankcal.pipeline.liquid.geometry import (
-    Loaded,
-    column_of,
-    load_geometry,
-    places_of,
-    stacked,
-)
+from tankcal.pipeline.liquid.body import Known, Loaded, column_of, load_geometry, places_of, stacked
 from tankcal.tank.liquid import (
     Effect,
     Fill,

@@ -9,7 +9,7 @@ from tankcal.geometry.field.estimate import gauss_heights
 from tankcal.job.contract.bottom import OF_CLOUD
 from tankcal.job.plausibility import INSIDE, PLATES_TO_INSIDE
 from tankcal.methods.base import given_methods
-from tankcal.pipeline.tanks.common import (
+from tankcal.pipeline.tanks.solid import (
     as_surveyed,
     deadwood_part,
     estimates_of,
@@ -18,12 +18,12 @@ from tankcal.pipeline.tanks.common import (
     thermal_scale,
 )
 from tankcal.tank.body import Body, ShellPart
+from tankcal.tank.bottoms import Footprint
 from tankcal.tank.budgets import cause_factors
 from tankcal.tank.fittings import floating_roof
 from tankcal.tank.heads import End, standard_end
 from tankcal.tank.hydrostatics import liquid_head
 from tankcal.tank.parts import Part
-from tankcal.tank.terrain import Footprint
 from tankcal.tank.tips import FORMS as TIPS
 from tankcal.tank.tips import HeadedShell, tip_of
 from tankcal.tank.volumes import DEPARTURES, CourseShape, ShellVolume

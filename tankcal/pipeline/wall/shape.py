@@ -20,7 +20,7 @@ import numpy as np
 import scipy
 
 from tankcal.geometry.field.components import COMPONENTS, KINDS
-from tankcal.geometry.field.values import FieldValues, Spots
+from tankcal.geometry.field.estimate import FieldValues, Spots
 from tankcal.geometry.outlines import radii_square_to_axis
 from tankcal.methods.base import completing_method
 from tankcal.pipeline.tanks import body_of

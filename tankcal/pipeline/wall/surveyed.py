@@ -14,8 +14,8 @@ import numpy as np
 import scipy.sparse
 
 from tankcal.covariance import PointCovariance
+from tankcal.geometry.field.amplitudes import noise_of_sections
 from tankcal.geometry.field.estimate import WallField
-from tankcal.geometry.field.section_noise import noise_of_sections
 from tankcal.geometry.shell import UNDECIDED, Shell
 from tankcal.messages import list_some, message
 from tankcal.pipeline.read_wall import (

@@ -6,10 +6,9 @@ from itertools import pairwise
 import numpy as np
 
 from tankcal.methods.base import count_readings, given_methods
-from tankcal.planning.wall.checks import least_ring_m
 from tankcal.planning.wall.filling import LEAST_STEP_M, SAME_M
 from tankcal.planning.wall.model import USUAL_AT, PlannedStrap, even_radius_m
-from tankcal.planning.wall.reading import change_plan, lengths_of_bars
+from tankcal.planning.wall.reading import change_plan, least_ring_m, lengths_of_bars
 from tankcal.survey.tangents import FEWEST_SETUPS
 from tankcal.tank.liquid.reduction import MOST_ROWS
 

@@ -9,10 +9,10 @@ from itertools import islice
 import numpy as np
 
 from tankcal.job.tables import Table
-from tankcal.planning.visibility import find_hidden
+from tankcal.planning.places import find_hidden
 from tankcal.planning.wall.filling import rows_of_runs
+from tankcal.survey.measurements import angle_of_distance_rad
 from tankcal.survey.reference_line import MOST_OFFSETS
-from tankcal.survey.stadia import angle_of_distance_rad
 from tankcal.survey.strapping import MOST_STRAPS
 from tankcal.survey.tangents import MOST_TANGENTS
 from tankcal.survey.wall_hits import MOST_HITS

@@ -14,8 +14,7 @@ import numpy as np
 from tankcal.adjust import noncentrality
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.pipeline.liquid.body import join_body
-from tankcal.pipeline.liquid.geometry import filled_range_m
+from tankcal.pipeline.liquid.body import filled_range_m, join_body
 from tankcal.planning.contract import PLAN_FILE, too_many_sections
 from tankcal.planning.wall.model import PlannedRun
 from tankcal.tank.liquid.reduction import MOST_ROWS

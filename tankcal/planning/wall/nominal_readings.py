@@ -39,7 +39,7 @@ from tankcal.geometry.field.sites import free_design, spans_of
 from tankcal.geometry.girth import draw_waves, girth_of, modes_of, nodes_of, tangent_excess
 from tankcal.methods.base import given_methods, with_readings
 from tankcal.pipeline.liquid.adjustment import adjust_liquid
-from tankcal.pipeline.liquid.geometry import geometry_beside, load_geometry
+from tankcal.pipeline.liquid.body import geometry_beside, load_geometry
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.wall_straps import area_term
 from tankcal.planning.measurements import draw_blunders

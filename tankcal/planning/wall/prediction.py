@@ -12,14 +12,12 @@ from tankcal.geometry.field.estimate import LEVELS
 from tankcal.job.model import Job
 from tankcal.methods.base import count_readings, given_methods, supplement_of
 from tankcal.pipeline.checks.wall import OF_SCATTER
-from tankcal.pipeline.liquid.geometry import NominalWall
-from tankcal.pipeline.liquid.measuring import Measured
-from tankcal.pipeline.liquid.result import LiquidResult
-from tankcal.pipeline.statements import statements
+from tankcal.pipeline.liquid.body import NominalWall
+from tankcal.pipeline.liquid.measuring import LiquidResult, Measured
 from tankcal.pipeline.surveying import find_survey
-from tankcal.pipeline.table import ComputedTable, check_table, compute_table
-from tankcal.pipeline.taped_wall import TapedWall
+from tankcal.pipeline.table import ComputedTable, check_table, compute_table, statements
 from tankcal.pipeline.wall.shared_unknowns import noise_of_wall
+from tankcal.pipeline.wall_straps import TapedWall
 from tankcal.planning.table import TableResults, refuse_without_delivery
 from tankcal.planning.wall.filling import (
     FillingOutlook,

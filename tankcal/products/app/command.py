@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem, TankcalError, reason_of
 from tankcal.messages import message
-from tankcal.products.app.people import ROLES
+from tankcal.products.app.access import ROLES
 from tankcal.terminal.showing import language_of_run, say, speak
 from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import load_words
@@ -171,7 +171,7 @@ def run_app(options):
 
 def _add_user(users, options):
     """Add a user with a password that is typed twice, or read from a pipe."""
-    from tankcal.products.app.people import add_user
+    from tankcal.products.app.access import add_user
 
     if sys.stdin.isatty():
         words = load_words(options.language or language_of_run())["app"]

@@ -8,8 +8,7 @@ from urllib.parse import parse_qs, quote
 from starlette.exceptions import HTTPException
 from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse
 
-from tankcal.products.app.guard import LANGUAGE_COOKIE
-from tankcal.products.app.people import EDIT, Person
+from tankcal.products.app.access import EDIT, LANGUAGE_COOKIE, Person
 from tankcal.text.shipped import DEFAULT, LANGUAGES, nearest_language
 
 THEME_COOKIE = "tankcal-theme"
@@ -212,6 +211,6 @@ def read_paper(job, language):
 
 def find_asked_fields(desk):
     """Fields of the certificate that ISO/IEC 17025 requires and that are blank."""
-    from tankcal.products.desk.forms import form_of
+    from tankcal.products.desk.display import form_of
 
     return [field for field in form_of(desk) if field.is_asked]

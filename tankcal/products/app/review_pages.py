@@ -6,6 +6,7 @@ from starlette.exceptions import HTTPException
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
+from tankcal.products.app.access import APPROVE, EDIT, REVIEW
 from tankcal.products.app.pages import (
     find_asked_fields,
     job_of,
@@ -17,10 +18,8 @@ from tankcal.products.app.pages import (
     redirect,
     render_job,
 )
-from tankcal.products.app.people import APPROVE, EDIT, REVIEW
-from tankcal.products.desk import review
-from tankcal.products.desk.review import Act
-from tankcal.products.desk.states import State, state_of_results
+from tankcal.products.desk import jobs
+from tankcal.products.desk.jobs import Act, State, state_of_results
 
 MOST_SHOWN = 200  # changes on the page
 MOST_DIGITS = 9  # of the number of a remark
@@ -42,22 +41,22 @@ def _describe_review(request, job, language):
     """Content of the page."""
     person, desk = person_of(request), job.desk
     try:
-        events, problem = review.read_events(job.source), ""
+        events, problem = jobs.read_events(job.source), ""
     except InputError as error:
         events, problem = (), "\n".join(desk.reader.say(text) for text in error.texts)
-    sha256 = review.record_digest(job.out)
+    sha256 = jobs.record_digest(job.out)
     is_present = not desk.draft.is_changed and _is_present(job)
-    decision = review.find_decision(events, sha256) if is_present else None
-    acts = review.NEXT[decision and decision.act] if is_present and not problem else ()
+    decision = jobs.find_decision(events, sha256) if is_present else None
+    acts = jobs.NEXT[decision and decision.act] if is_present and not problem else ()
     certificates = request.app.state.site.read_register() if is_present else {}
     certificate = next(
         (item for item in certificates.values() if item.record_sha256 == sha256), None
     )
-    copy, path = review.find_copy(job.source, events, sha256 if is_present else "")
-    changes = [] if copy is None else review.list_changes(path, desk.draft)
+    copy, path = jobs.find_copy(job.source, events, sha256 if is_present else "")
+    changes = [] if copy is None else jobs.list_changes(path, desk.draft)
     values = {
-        "events": [event for event in events if event.act in review.DECISIONS],
-        "remarks": review.list_remarks(events),
+        "events": [event for event in events if event.act in jobs.DECISIONS],
+        "remarks": jobs.list_remarks(events),
         "review_problem": problem,
         "is_present": is_present,
         "decision": decision,
@@ -74,7 +73,7 @@ def _describe_review(request, job, language):
         "changes": [(item, desk.reader.title(item.name)) for item in changes[:MOST_SHOWN]],
         "more": max(0, len(changes) - MOST_SHOWN),
         "name": person.name or desk.draft.value("certificate", "authorised_by"),
-        "submitters": review.list_submitters(events, sha256),
+        "submitters": jobs.list_submitters(events, sha256),
         "record_sha256": sha256,
         "places": [(name, desk.reader.title(name)) for name in ("job", *desk.names)],
         "lines": [], "verdict": "", "rejected": 0, "warnings": [], "met": 0, "checked": 0,
@@ -157,7 +156,7 @@ async def decide(request):
         _refuse_same_person(job, sha256, name)
     place = ", ".join(filter(None, (form.get(key, "").strip() for key in ("table", "row"))))
     number = form.get("number", "")
-    review.add_event(
+    jobs.add_event(
         draft, act, name, sha256, form.get("text", ""), place,
         int(number) if number.isdecimal() and len(number) <= MOST_DIGITS else 0,
     )  # fmt: skip
@@ -170,7 +169,7 @@ async def decide(request):
 
 def _refuse_other_results(job, sha256):
     """Raise InputError if the results are no longer those of the page, or not of the files."""
-    is_same = sha256 and review.record_digest(job.out) == sha256
+    is_same = sha256 and jobs.record_digest(job.out) == sha256
     if not is_same or job.desk.draft.is_changed or job.is_computing or not _is_present(job):
         text = message(
             "review_other_results",
@@ -196,7 +195,7 @@ def _refuse_unexplained(job):
 def _refuse_same_person(job, sha256, name):
     """Raise InputError for an approval by the person who submitted, without a reason."""
     name = " ".join(name.split())
-    if name in review.list_submitters(review.read_events(job.source), sha256):
+    if name in jobs.list_submitters(jobs.read_events(job.source), sha256):
         text = message(
             "review_same_person",
             "{name} submitted these results; expected another person, or the reason for approving "
@@ -226,7 +225,7 @@ async def issue_certificate(request):
     job, site, form = job_of(request), request.app.state.site, await read_form(request)
     sha256 = form.get("record", "")
     _refuse_other_results(job, sha256)
-    decision = review.find_decision(review.read_events(job.source), sha256)
+    decision = jobs.find_decision(jobs.read_events(job.source), sha256)
     if (
         decision is None
         or decision.act is not Act.APPROVED

@@ -22,18 +22,24 @@ from starlette.responses import (
 from starlette.routing import Mount, Route
 
 from tankcal.errors import InputError, TankcalError
+from tankcal.products.app.access import APPROVE, EDIT, LANGUAGE_COOKIE, REPORT_POLICY, RUN
 from tankcal.products.app.folders import pack_sent_folder
-from tankcal.products.app.guard import LANGUAGE_COOKIE, REPORT_POLICY
 from tankcal.products.app.office_pages import (
+    add_logs,
     compare_upload,
     create_from_chart,
+    create_service,
     draw_chart,
     end_session,
+    list_services,
     open_sent_job,
+    send_document,
     send_register,
     show_chart,
     show_login,
     show_register,
+    show_service,
+    show_services,
     show_upload,
     start_session,
     view_record,
@@ -60,16 +66,7 @@ from tankcal.products.app.pages import (
     show_refusal,
     upload_of,
 )
-from tankcal.products.app.people import APPROVE, EDIT, RUN
 from tankcal.products.app.review_pages import decide, issue_certificate, show_review, take_over
-from tankcal.products.app.service_pages import (
-    add_logs,
-    create_service,
-    list_services,
-    send_document,
-    show_service,
-    show_services,
-)
 from tankcal.text.shipped import LANGUAGES, shipped_folder
 
 FOLDER = Path(__file__).parent
@@ -346,7 +343,7 @@ async def show_keys(request):
 
 async def show_settings(request):
     """Form of the settings in groups."""
-    from tankcal.products.desk.forms import Group, form_of
+    from tankcal.products.desk.display import Group, form_of
 
     job = job_of(request)
     await job.check()
@@ -370,7 +367,7 @@ async def show_table(request):
 
 async def send_grid(request):
     """Content of a grid."""
-    from tankcal.products.desk.windows import describe_grid, describe_state
+    from tankcal.products.desk.display import describe_grid, describe_state
 
     job, name = job_of(request), request.path_params["name"]
     if name not in (*job.desk.names, *job.desk.lists):
@@ -386,7 +383,7 @@ async def send_grid(request):
 
 def answer_changes(job, name, since, entered=()):
     """Differences of a table since a revision, with the state of the job."""
-    from tankcal.products.desk.windows import describe_changes
+    from tankcal.products.desk.display import describe_changes
 
     return JSONResponse(job.describe() | describe_changes(job.desk, name, since, entered))
 
@@ -423,7 +420,7 @@ async def send_events(request):
 
 async def act(request):
     """Carry out an action on a table or on the settings, and answer with the differences."""
-    from tankcal.products.desk.windows import enter_setting
+    from tankcal.products.desk.display import enter_setting
 
     job, content = job_of(request), await read_action(request)
     desk, name, since = job.desk, content.get("name"), content.get("since", -1)
@@ -645,7 +642,7 @@ async def run(request):
 
 async def run_all(request):
     """Compute all listed jobs that are ready or older than their data; two at a time."""
-    from tankcal.products.desk.states import State
+    from tankcal.products.desk.jobs import State
 
     site = request.app.state.site
     jobs = await asyncio.to_thread(site.list_recent)
@@ -668,7 +665,7 @@ async def stop(request):
 
 async def show_results(request):
     """Results with documents, rejected points and files; progress while they are computed."""
-    from tankcal.products.desk.states import state_of_results
+    from tankcal.products.desk.jobs import state_of_results
 
     job = job_of(request)
     await job.check()

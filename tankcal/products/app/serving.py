@@ -10,11 +10,10 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem, reason_of
 from tankcal.messages import message
-from tankcal.products.app.guard import Guard, new_token
-from tankcal.products.app.people import People
+from tankcal.products.app.access import Guard, People, new_token
 from tankcal.products.app.server import make_application
 from tankcal.products.app.site import Site
-from tankcal.products.desk.journal import find_state_folder
+from tankcal.products.desk.jobs import find_state_folder
 
 HERE = "127.0.0.1"  # address that only this machine can reach
 LOCAL_NAMES = ("127.0.0.1", "localhost", "[::1]")

@@ -16,17 +16,25 @@ from pathlib import Path
 
 from tankcal.errors import InputError
 from tankcal.messages import message
-from tankcal.products.app.people import ChangeLog
+from tankcal.products.app.access import ChangeLog
 from tankcal.products.desk.computing import Refusal
 from tankcal.products.desk.desk import Desk
-from tankcal.products.desk.display import Reader
+from tankcal.products.desk.display import Reader, describe_state
 from tankcal.products.desk.draft import Draft, source_of
-from tankcal.products.desk.jobs import RecentJobs
-from tankcal.products.desk.journal import Journal, find_state_folder
-from tankcal.products.desk.locks import RENEWAL_S, JobLock, new_owner
-from tankcal.products.desk.review import Act, find_decision, read_events, record_digest
-from tankcal.products.desk.states import State, state_of_results
-from tankcal.products.desk.windows import describe_state
+from tankcal.products.desk.jobs import (
+    RENEWAL_S,
+    Act,
+    JobLock,
+    Journal,
+    RecentJobs,
+    State,
+    find_decision,
+    find_state_folder,
+    new_owner,
+    read_events,
+    record_digest,
+    state_of_results,
+)
 from tankcal.report.folders import default_folder
 from tankcal.text.words import load_words
 
@@ -124,7 +132,7 @@ class OpenJob:
 
     def _find_approval(self):
         """Event of the approval of the present results, or None; kept while no file changes."""
-        from tankcal.products.desk.review import FILE, folder_of
+        from tankcal.products.desk.jobs import FILE, folder_of
 
         path = folder_of(self.source) / FILE
         try:

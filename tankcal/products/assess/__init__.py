@@ -15,6 +15,6 @@ class Assessment(Product):
         return (DOCUMENT,)
 
     def saved_types(self):
-        from tankcal.products.assess.saved import ASSESSMENT, AssessmentFile
+        from tankcal.products.assess.requirements import ASSESSMENT, AssessmentFile
 
         return ((ASSESSMENT, None, AssessmentFile),)

@@ -21,7 +21,7 @@ from tankcal.job.tables import Log
 from tankcal.messages import message
 from tankcal.products.linter.grids import read_pages
 from tankcal.report.document import blocks_of
-from tankcal.report.letterhead import LETTERHEAD_FILE
+from tankcal.report.laboratory import LETTERHEAD_FILE
 from tankcal.report.notebook import TEMPLATES, execute, join_templates, set_parameters
 from tankcal.report.outputs import RECORD
 from tankcal.report.paper import Paper, ReadRecord

@@ -4,8 +4,7 @@ import re
 from typing import ClassVar
 
 from tankcal.messages import message
-from tankcal.products.assess.requirements import GRADES, MAJOR, MINOR, RULE
-from tankcal.products.assess.saved import ASSESSMENT
+from tankcal.products.assess.requirements import ASSESSMENT, GRADES, MAJOR, MINOR, RULE
 from tankcal.report import blocks
 from tankcal.report.plain import words_with_part
 from tankcal.report.saved_document import SavedDocument, SavedPaper, bearable

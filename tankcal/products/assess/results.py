@@ -14,8 +14,8 @@ from tankcal.messages import message
 from tankcal.products.assess.requirements import MINOR, OBSERVATION, Finding
 from tankcal.products.linter.linting import lint
 from tankcal.record.covariance_factor import factor_of
+from tankcal.report.laboratory import find_capability, is_outside_scope
 from tankcal.report.outputs import RECORD
-from tankcal.report.scope import find_capability, is_outside_scope
 from tankcal.report.uncertainty.stated import MONTE_CARLO, stated_U_m3
 
 _SAME = 1e-6  # largest relative difference of equal numbers of a record

@@ -135,7 +135,7 @@ def refuse_unreadable(options):
 def _check_letterhead(options):
     """Raise InputError for an invalid letterhead file."""
     if options.letterhead is not None:
-        from tankcal.report.letterhead import load
+        from tankcal.report.laboratory import load
 
         load(options.letterhead)
 

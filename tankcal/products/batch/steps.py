@@ -323,7 +323,7 @@ def _letterhead(options):
     """Return the letterhead, or None."""
     if options.letterhead is None:
         return None
-    from tankcal.report.letterhead import load
+    from tankcal.report.laboratory import load
 
     return load(options.letterhead)
 

@@ -12,7 +12,7 @@ from enum import StrEnum
 from fractions import Fraction
 
 from tankcal.job.contract import COLUMNS, columns_of
-from tankcal.job.decimals import has_two_meanings
+from tankcal.job.field_values import has_two_meanings
 from tankcal.job.folder import is_row
 from tankcal.job.headings import LENGTHS, Meaning, meanings_of, stated_meaning
 from tankcal.job.sheets import SETTINGS_SHEET

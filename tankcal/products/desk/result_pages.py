@@ -4,7 +4,7 @@ They are shown in a sandbox, which loads no other page and has no access to its 
 """
 
 from tankcal.report.blocks import document
-from tankcal.report.tables import overrulings
+from tankcal.report.tables import survey
 from tankcal.report.tables import tank as tables
 from tankcal.report.uncertainty import budget, capacity
 from tankcal.report.web import page
@@ -44,7 +44,7 @@ def whole_page(paper):
     if record["rejected"]:
         blocks += [paper.heading("rejected"), paper.show(tables.REJECTED)]
     if record.get("overrulings"):
-        blocks += [paper.heading("overrulings"), paper.show(overrulings.OVERRULINGS)]
+        blocks += [paper.heading("overrulings"), paper.show(survey.OVERRULINGS)]
     if record["budget"]:
         blocks += [paper.heading("budget"), *budget.top(paper)]
     return _page(paper, blocks)

@@ -8,13 +8,13 @@ from html import escape
 
 from tankcal.errors import InputError
 from tankcal.job.starter.texts import split_unit
+from tankcal.products.quantity.chain import STATES
 from tankcal.products.quantity.reading import GAUGING, GLASS, PRODUCT, SHELL, read_tickets
 from tankcal.products.quantity.saving import ticket_file
 from tankcal.products.quantity.table import table_of
-from tankcal.products.quantity.transfer import STATES
 from tankcal.record.schema import to_plain
 from tankcal.report.ticket import TicketPaper
-from tankcal.report.ticket import tables as of_ticket
+from tankcal.report.ticket import pages as of_ticket
 from tankcal.report.ticket.pages import label_text, notes, result_text
 from tankcal.report.web import block_html
 from tankcal.tank.gauging import FIELDS_OF_U, UNCERTAINTIES, UNITS_OF_U

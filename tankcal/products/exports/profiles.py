@@ -10,9 +10,8 @@ from fractions import Fraction
 from pathlib import Path
 
 from tankcal.errors import InputError, Problem
-from tankcal.job.contract.shorthand import choice, number
 from tankcal.job.entries import read_section
-from tankcal.job.fields import Field
+from tankcal.job.fields import Field, choice, number
 from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml
 from tankcal.job.tables import Log, nearest, read_bytes, shown
 from tankcal.messages import message

@@ -134,7 +134,7 @@ def _time(text):
 
 
 def _import(options):
-    from tankcal.terminal.input_language import read_job_language
+    from tankcal.terminal.showing import read_job_language
 
     options.out = options.out or _folder_here(options.names)
     folder = Path(options.out)

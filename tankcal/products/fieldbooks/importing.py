@@ -22,8 +22,8 @@ from tankcal.products.fieldbooks.rows import (
     make_rows,
     reduce_faces,
     sort_readings,
+    write_tables,
 )
-from tankcal.products.fieldbooks.writing import write_tables
 from tankcal.survey.wall_hits import MOST_HITS
 from tankcal.units import ARCSEC_PER_DEG
 

@@ -6,14 +6,14 @@ from fractions import Fraction
 from pathlib import Path
 
 from tankcal.job.contract import COLUMNS
-from tankcal.job.decimals import has_two_meanings, settle_decimal
 from tankcal.job.entries import read_columns
+from tankcal.job.field_values import has_two_meanings, settle_decimal
 from tankcal.job.fields import is_blank
 from tankcal.job.folder import declared_marks, parsed_toml, read_csv, read_toml
 from tankcal.job.headings import Meaning, meanings_of, stated_meaning
 from tankcal.job.tables import NOT_KNOWN, SETTINGS_FILE, Log, Table, nearest, read_bytes
 from tankcal.messages import message
-from tankcal.products.fieldbooks.writing import find_filled_tables, refuse_filled, write_grids
+from tankcal.products.fieldbooks.rows import find_filled_tables, refuse_filled, write_grids
 from tankcal.text.naming import MAX_NAME, NUMBER
 
 MEMORY_FILE = "headings.toml"  # in the job folder: meanings of headings of earlier lists

@@ -428,7 +428,7 @@ DOCUMENT = SavedDocument(
     ),
     tables=FILES,
     has_page=False,
-    recomputed_by="tankcal.products.gauge.recomputation:compute_again",
+    recomputed_by="tankcal.products.gauge.commissioning:compute_again",
 )
 
 # ---- sketch of the three zeros for the certificate: dip plate, table and gauge

@@ -11,9 +11,8 @@ from tankcal.errors import InputError, Problem
 from tankcal.gum.coverage import coverage_factor
 from tankcal.job.checking import missing_beside
 from tankcal.job.contract.keys import CSV
-from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.entries import ColumnValues, read_columns
-from tankcal.job.fields import Field
+from tankcal.job.fields import Field, choice, number, positive
 from tankcal.job.folder import read_csv
 from tankcal.job.tables import Log, make_table, read_bytes, shown
 from tankcal.messages import message

@@ -3,8 +3,7 @@
 from pathlib import Path
 
 from tankcal.record.saved_formats import SavedFormat
-from tankcal.record.schema import Finite, Saved, key
-from tankcal.record.texts import WarningRecord
+from tankcal.record.schema import Finite, Saved, WarningRecord, key
 from tankcal.version import find_version
 
 GAUGE = SavedFormat("tankcal-gauge", 1, "gauge.json", schemas=Path(__file__).with_name("schemas"))

@@ -70,7 +70,7 @@ def add(commands):
 
 
 def _inspect(options):
-    from tankcal.terminal.input_language import read_job_language, read_record_language
+    from tankcal.terminal.showing import read_job_language, read_record_language
 
     speak(
         options.language

@@ -36,8 +36,7 @@ from tankcal.products.inspection.welds import list_welds
 from tankcal.record import content_error
 from tankcal.record.inspection import InspectedTank, InspectionFile, InspectionRule
 from tankcal.record.making import JobAsRead, shape_record
-from tankcal.record.schema import fill_from, to_plain
-from tankcal.record.texts import WarningRecord, warnings_of
+from tankcal.record.schema import WarningRecord, fill_from, to_plain, warnings_of
 
 NOMINALS = ("drawing", "mean")  # sources of the nominal radius
 OFF_NOMINAL_MM = 5.0  # deviation of the mean radius that is within building tolerances

@@ -16,9 +16,8 @@ from tankcal.adjust import ALPHA
 from tankcal.errors import SolutionError
 from tankcal.geometry.circles import fit_circle
 from tankcal.job.checking import missing_beside, tiny_sd
-from tankcal.job.contract.shorthand import number, positive
 from tankcal.job.entries import read_columns
-from tankcal.job.fields import Field
+from tankcal.job.fields import Field, number, positive
 from tankcal.job.folder import read_csv
 from tankcal.job.tables import read_bytes
 from tankcal.messages import list_some, message

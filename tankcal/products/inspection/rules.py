@@ -16,8 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tankcal.gum.conformity import RuleSet, probability_of, verdict_of
-from tankcal.job.contract.shorthand import number, positive
-from tankcal.job.fields import Field
+from tankcal.job.fields import Field, number, positive
 from tankcal.job.rule_files import HEAD, SOURCE, RuleFiles
 from tankcal.record.inspection import InspectionCheck, InspectionLimit
 

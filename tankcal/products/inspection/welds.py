@@ -54,7 +54,7 @@ def list_welds(course_heights_m, given_rad=(), detected=(), radius_m=np.inf):
         Heights of the courses between joints, from the bottom up, m.
     given_rad : sequence of sequence of float or None, optional
         Given azimuths of the vertical welds of each course, rad; None if unknown.
-    detected : sequence of tankcal.clouds.wall.features.Weld, optional
+    detected : sequence of tankcal.clouds.wall.deciding.Weld, optional
         Welds detected in a cloud. A weld near a given weld of its course is ignored.
     radius_m : float, optional
         Radius of the shell, m.

@@ -12,9 +12,8 @@ import numpy as np
 from scipy.stats import norm
 
 from tankcal.errors import InputError, Problem, TankcalError
-from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.entries import read_columns, read_section, unknown_section
-from tankcal.job.fields import Field
+from tankcal.job.fields import Field, choice, number, positive
 from tankcal.job.folder import MAX_SETTINGS_BYTES, declared_marks, read_csv, read_toml
 from tankcal.job.tables import SEPARATORS, nearest, read_bytes
 from tankcal.messages import list_some, message

@@ -19,8 +19,7 @@ import numpy as np
 
 from tankcal.job.contract import COLUMNS, KEYS, REGISTER_KEYS
 from tankcal.messages import message
-from tankcal.products.intercomparison.observers import METHODS
-from tankcal.products.intercomparison.observers.cloud import LAS_STEP_M
+from tankcal.products.intercomparison.observers import LAS_STEP_M, METHODS
 from tankcal.products.intercomparison.site import Chance, request_table
 from tankcal.products.intercomparison.tank import FAMILIES, draw_tank
 from tankcal.record.intercomparison import (

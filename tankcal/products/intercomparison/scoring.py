@@ -35,7 +35,7 @@ from tankcal.record.intercomparison import (
     ScoresFile,
     TableForm,
 )
-from tankcal.record.texts import warnings_of
+from tankcal.record.schema import warnings_of
 from tankcal.version import find_version
 
 

@@ -48,7 +48,7 @@ def add(commands):
 def _lint(options):
     speak(options.language)
     from tankcal.products.linter.linting import lint
-    from tankcal.products.linter.totals import Nominal
+    from tankcal.products.linter.volumes import Nominal
 
     if options.nominal_diameter is not None and options.nominal_height is None:
         expected = message("nominal_height_too", "given without --nominal-height; expected both")

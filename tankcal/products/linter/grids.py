@@ -23,7 +23,7 @@ from tankcal.job.folder import decode, has_too_many_lines, is_row, split_lines
 from tankcal.job.sheets import is_read
 from tankcal.job.tables import MAX_COLUMNS, read_bytes, shown, too_many_columns
 from tankcal.messages import message
-from tankcal.products.linter.headings import heading_of, is_unit
+from tankcal.products.linter.units import heading_of, is_unit
 from tankcal.products.linter.wide import are_even, read_label
 from tankcal.record import FORMAT, altered_since, version_of
 from tankcal.text.delimited import find_separator, split_cells

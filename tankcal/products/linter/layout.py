@@ -13,14 +13,6 @@ from itertools import pairwise, zip_longest
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.products.linter.headings import (
-    Uncertainty,
-    heading_of,
-    is_coverage_factor,
-    is_heading_of_parts,
-    is_unit,
-    uncertainty_of,
-)
 from tankcal.products.linter.numbers import (
     Reading,
     feet_reader,
@@ -33,7 +25,17 @@ from tankcal.products.linter.numbers import (
     read_number,
     style_of,
 )
-from tankcal.products.linter.units import Unit, countries_in, plain_text
+from tankcal.products.linter.units import (
+    Uncertainty,
+    Unit,
+    countries_in,
+    heading_of,
+    is_coverage_factor,
+    is_heading_of_parts,
+    is_unit,
+    plain_text,
+    uncertainty_of,
+)
 from tankcal.products.linter.wide import (
     WideHeading,
     find_unnamed_columns,

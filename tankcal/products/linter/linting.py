@@ -12,15 +12,16 @@ from tankcal.messages import message
 from tankcal.products.linter.grids import read_grids
 from tankcal.products.linter.heights import Series, check_heights
 from tankcal.products.linter.layout import Table, find_tables
-from tankcal.products.linter.totals import (
+from tankcal.products.linter.volumes import (
     NO_NOMINAL,
     NO_UNITS,
     Nominal,
     Units,
+    Volumes,
     check_totals,
+    check_volumes,
     choose_units,
 )
-from tankcal.products.linter.volumes import Volumes, check_volumes
 from tankcal.text.display import table_html
 
 # Largest number of rows of proportional parts: 9 for a centimetre, 7 or 15 for an inch.

@@ -33,8 +33,7 @@ import numpy as np
 from tankcal.errors import HeightError, InputError, Problem
 from tankcal.job.tables import BadCell, shown
 from tankcal.messages import message
-from tankcal.products.linter.headings import Heading, parts_of_inch
-from tankcal.products.linter.units import Unit, plain_text
+from tankcal.products.linter.units import Heading, Unit, parts_of_inch, plain_text
 from tankcal.tank.dips import INCHES_PER_FOOT, METRES_PER_INCH, parse_dip
 from tankcal.units import FOOT_M, INCH_M
 

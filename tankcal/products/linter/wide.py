@@ -13,13 +13,14 @@ import numpy as np
 
 from tankcal.errors import Problem
 from tankcal.messages import message
-from tankcal.products.linter.headings import Heading, heading_of
 from tankcal.products.linter.numbers import has_digit, has_letter, is_blank, read_number, style_of
 from tankcal.products.linter.units import (
     LENGTH,
     VOLUME,
+    Heading,
     Unit,
     drop_prepositions,
+    heading_of,
     number_of,
     size_of,
     tokens_of,

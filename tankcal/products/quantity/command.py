@@ -185,8 +185,7 @@ def _tell(tickets):
     from tankcal.products.quantity.saving import ticket_file
     from tankcal.record.schema import to_plain
     from tankcal.report.ticket import TicketPaper
-    from tankcal.report.ticket.pages import comparison_text, room_texts
-    from tankcal.report.ticket.tables import step_text
+    from tankcal.report.ticket.pages import comparison_text, room_texts, step_text
 
     paper = TicketPaper(to_plain(ticket_file(tickets)), language_of_run())
     saved = paper.record
@@ -207,7 +206,7 @@ def _tell(tickets):
 
 
 def _quantity_line(paper, row):
-    from tankcal.report.ticket.tables import QUANTITY_UNITS, dof_text, unit_symbol
+    from tankcal.report.ticket.pages import QUANTITY_UNITS, dof_text, unit_symbol
 
     written = format_with_u(row["value"], row["U"], marks())
     return message(
@@ -225,7 +224,7 @@ def _quantity_line(paper, row):
 
 def _budget_lines(paper):
     """Yield the largest contributions to u of the net standard volume."""
-    from tankcal.report.ticket.tables import budget_rows, origin_text
+    from tankcal.report.ticket.pages import budget_rows, origin_text
 
     rows = budget_rows(paper)
     if rows:

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from tankcal.job.contract.shorthand import number
 from tankcal.job.entries import read_columns
+from tankcal.job.fields import number
 from tankcal.job.folder import read_csv
 from tankcal.job.tables import read_bytes
 from tankcal.messages import message
 from tankcal.tank.gauging import LIMITS
-from tankcal.tank.volume_correction.factors import FactorTable
-from tankcal.tank.volume_correction.ranges import DEGREES
+from tankcal.tank.volume_correction.corrections import FactorTable
+from tankcal.tank.volume_correction.petroleum import DEGREES
 
 TEMPERATURE = "temperature_c"
 LEAST_FACTOR, MOST_FACTOR = 0.3, 1.7  # of a plausible table

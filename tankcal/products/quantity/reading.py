@@ -9,24 +9,32 @@ import numpy as np
 
 from tankcal.job.checking import missing_beside, refuse_repeated
 from tankcal.job.contract.keys import CSV
-from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.entries import ColumnValues, read_columns
-from tankcal.job.fields import Field
+from tankcal.job.fields import Field, choice, number, positive
 from tankcal.job.folder import read_csv
 from tankcal.job.tables import Log, read_bytes
 from tankcal.messages import message
-from tankcal.products.quantity.chain import QUANTITIES, Gauging, Product, follow_chain
+from tankcal.products.quantity.chain import (
+    QUANTITIES,
+    STATES,
+    Gauging,
+    Product,
+    Transfer,
+    follow_chain,
+)
 from tankcal.products.quantity.factor_table import read_factor_table
 from tankcal.products.quantity.results import find_slips
-from tankcal.products.quantity.transfer import STATES, Transfer
 from tankcal.products.settings import fill_blanks, read_sections
 from tankcal.record.manifest import digest_of
 from tankcal.tank.gauging import LIMITS, UNCERTAINTIES
-from tankcal.tank.volume_correction.alcohol import Ethanol
-from tankcal.tank.volume_correction.corrections import CORRECTIONS, TABLE
-from tankcal.tank.volume_correction.factors import FactorTable
-from tankcal.tank.volume_correction.petroleum import BASES_C, GROUPS, glass_correction
-from tankcal.tank.volume_correction.ranges import DEGREES, OutsideRangeError
+from tankcal.tank.volume_correction.corrections import CORRECTIONS, TABLE, Ethanol, FactorTable
+from tankcal.tank.volume_correction.petroleum import (
+    BASES_C,
+    DEGREES,
+    GROUPS,
+    OutsideRangeError,
+    glass_correction,
+)
 from tankcal.text.display import volume_text
 
 MOST_TICKETS = 100_000

@@ -9,7 +9,7 @@ from tankcal.products.quantity.table import read_table
 from tankcal.products.recomputing import compare_values, find_record
 from tankcal.record.schema import to_plain
 from tankcal.record.ticket import TICKET
-from tankcal.tank.volume_correction.factors import FactorTable
+from tankcal.tank.volume_correction.corrections import FactorTable
 
 
 def compute_again(saved, folder):

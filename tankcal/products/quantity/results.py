@@ -15,13 +15,11 @@ import numpy as np
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.products.quantity.chain import QUANTITIES, values_of
-from tankcal.products.quantity.transfer import STATES
+from tankcal.products.quantity.chain import QUANTITIES, STATES, values_of
 from tankcal.products.settings import drop_blanks
 from tankcal.report.folders import replace_file
 from tankcal.tank.volume_correction.corrections import TABLE
-from tankcal.tank.volume_correction.petroleum import BASES_C
-from tankcal.tank.volume_correction.ranges import DEGREES
+from tankcal.tank.volume_correction.petroleum import BASES_C, DEGREES
 from tankcal.text.delimited import write_guarded
 
 # First columns of `rows_of`, which identify a file that may be replaced.

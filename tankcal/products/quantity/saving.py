@@ -6,11 +6,10 @@ import numpy as np
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.products.quantity.chain import QUANTITIES
+from tankcal.products.quantity.chain import QUANTITIES, STATES
 from tankcal.products.quantity.results import compare
-from tankcal.products.quantity.transfer import STATES
 from tankcal.products.settings import drop_blanks
-from tankcal.record.texts import warnings_of
+from tankcal.record.schema import warnings_of
 from tankcal.record.ticket import (
     ComparisonOfTicket,
     ContributionToTicket,
@@ -25,7 +24,7 @@ from tankcal.record.ticket import (
     UncertaintyOfTicket,
 )
 from tankcal.tank.gauging import ASSUMPTIONS, KEY_OF_INPUT
-from tankcal.tank.volume_correction.factors import FactorTable
+from tankcal.tank.volume_correction.corrections import FactorTable
 
 UNITS = {  # of the steps; others have no unit
     **dict.fromkeys(("tov_m3", "fw_m3", "fra_m3", "gov_m3", "gsv_m3", "nsv_m3"), "m3"),

@@ -14,12 +14,11 @@ import numpy as np
 from tankcal.errors import InputError, Problem
 from tankcal.job.tables import Log
 from tankcal.messages import message
-from tankcal.products.quantity.chain import QUANTITIES, Gauging, values_of
+from tankcal.products.quantity.chain import QUANTITIES, Gauging, Transfer, values_of
 from tankcal.products.quantity.reading import SECTIONS, SETTINGS_NAME, read_tickets
 from tankcal.products.quantity.table import TankTable
-from tankcal.products.quantity.transfer import Transfer
 from tankcal.products.settings import drop_blanks, read_sections
-from tankcal.tank.volume_correction.ranges import OutsideRangeError
+from tankcal.tank.volume_correction.petroleum import OutsideRangeError
 
 MOST_CELLS = 200_000
 _READINGS = ("u_dip_mm", "u_tape_ppm", "u_water_dip_mm", "u_temperature_k", "u_thermometer_k",

@@ -4,8 +4,8 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
+from tankcal.products.quantity.chain import STATES
 from tankcal.products.quantity.reading import SECTIONS
-from tankcal.products.quantity.transfer import STATES
 from tankcal.tank.gauging import ASSUMPTIONS
 from tankcal.text.words import load_words
 

@@ -24,9 +24,9 @@ class FormerTables(Product):
         return comparison.DOCUMENT, history.DOCUMENT
 
     def saved_types(self):
-        from tankcal.record import comparison, history
+        from tankcal.record import recalibration
 
         return (
-            (comparison.COMPARISON, None, comparison.ComparisonFile),
-            (history.HISTORY, None, history.HistoryFile),
+            (recalibration.COMPARISON, None, recalibration.ComparisonFile),
+            (recalibration.HISTORY, None, recalibration.HistoryFile),
         )

@@ -26,7 +26,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from tankcal.products.recalibration.upright_shell import Rings, estimate_radii
-from tankcal.record.comparison import ComparedCourse
+from tankcal.record.recalibration import ComparedCourse
 
 PROPORTIONAL = 0.01  # largest spread of U over V of a U stated in percent
 SAME_M = 1e-9  # largest difference of equal dips

@@ -20,12 +20,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.errors import InputError, Problem, SolutionError
-from tankcal.job.model.settings import Material
+from tankcal.job.model import Material
 from tankcal.messages import message
 from tankcal.products.recalibration.agreement import adjust_difference, slopes_m2
 from tankcal.products.recalibration.upright_geometry import read_upright
 from tankcal.products.recalibration.upright_shell import Rings, estimate_radii
-from tankcal.record.comparison import BasisStep, ZeroShift
+from tankcal.record.recalibration import BasisStep, ZeroShift
 from tankcal.tank.fittings import floating_roof
 
 MOST_ROWS = 900  # largest number of rows from which a density is estimated
@@ -211,7 +211,7 @@ class Step:
     added_m3 : (rows,) ndarray
         Change of the former volumes.
     state, source, former, new, lacking
-        As in `record.comparison.BasisStep`.
+        As in `record.recalibration.BasisStep`.
     """
 
     added_m3: np.ndarray

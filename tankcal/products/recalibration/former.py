@@ -11,16 +11,15 @@ import numpy as np
 
 from tankcal.job.checking import RELATIVE_DENSITY, missing_beside, refuse_repeated
 from tankcal.job.contract.courses import COLUMNS, SMALLEST_THICKNESS_MM, no_courses
-from tankcal.job.contract.roof import KEYS as ROOF
-from tankcal.job.contract.roof import upside_down
-from tankcal.job.contract.shorthand import KINDS, choice, number, positive
+from tankcal.job.contract.fittings import KEYS as ROOF
+from tankcal.job.contract.fittings import upside_down
 from tankcal.job.entries import read_columns, read_section, unknown_section
-from tankcal.job.fields import Field, is_blank
+from tankcal.job.fields import KINDS, Field, choice, is_blank, number, positive
 from tankcal.job.folder import MAX_SETTINGS_BYTES, read_csv, read_toml
 from tankcal.job.tables import read_bytes
 from tankcal.messages import message
-from tankcal.products.linter.totals import NO_UNITS, Units
 from tankcal.products.linter.units import FOOT3_M3, IMPERIAL_GALLON_M3, US_GALLON_M3
+from tankcal.products.linter.volumes import NO_UNITS, Units
 from tankcal.units import FOOT_M, INCH_M
 
 HEIGHT_UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": INCH_M, "ft": FOOT_M}

@@ -72,7 +72,7 @@ def add(commands):
 
 def _history(options):
     speak_of_record(options.language, *options.sources)
-    from tankcal.products.recalibration.history_inputs import history_of_files
+    from tankcal.products.recalibration.history import history_of_files
     from tankcal.record.schema import to_plain
 
     if options.out is not None:

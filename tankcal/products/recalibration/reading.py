@@ -10,7 +10,7 @@ from tankcal.errors import InputError
 from tankcal.job.tables import Log, nearest
 from tankcal.messages import message
 from tankcal.products.linter.linting import check_file
-from tankcal.products.linter.totals import NO_NOMINAL, NO_UNITS, likely_units
+from tankcal.products.linter.volumes import NO_NOMINAL, NO_UNITS, likely_units
 from tankcal.products.recalibration.former import (
     FormerFacts,
     FormerRoof,

@@ -14,14 +14,13 @@ from pathlib import Path
 from tankcal import record as records
 from tankcal.errors import InputError, Problem
 from tankcal.job.certificate_entries import missing_entries
-from tankcal.job.contract.shorthand import choice
 from tankcal.job.entries import read_columns
-from tankcal.job.fields import Field
+from tankcal.job.fields import Field, choice
 from tankcal.job.folder import read_csv
 from tankcal.job.tables import NOT_KNOWN, Log, nearest, read_bytes
 from tankcal.messages import message
 from tankcal.report.folders import lock_file
-from tankcal.report.letterhead import LETTERHEAD_FILE
+from tankcal.report.laboratory import LETTERHEAD_FILE
 from tankcal.text.delimited import write_guarded
 
 ISSUED, REPLACED, WITHDRAWN = STATES = ("issued", "replaced", "withdrawn")

@@ -15,7 +15,7 @@ from tankcal import record as records
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.pipeline.liquid.measuring import BALANCE, BY_LIQUID
-from tankcal.pipeline.tanks.corrections import Correction
+from tankcal.pipeline.tanks import Correction
 from tankcal.products.upkeep.estimation import estimate
 from tankcal.products.upkeep.reading import SETTINGS, read_upkeep
 from tankcal.products.upkeep.state import NO_STATE
@@ -23,9 +23,8 @@ from tankcal.products.upkeep.upkeep import keep_up, update_table
 from tankcal.record.covariance_factor import blocks_of
 from tankcal.record.making import KeptUp, MeterByTank
 from tankcal.record.recomputation import compare_records
-from tankcal.record.schema import to_plain
+from tankcal.record.schema import to_plain, warnings_of
 from tankcal.record.table import budget_lines
-from tankcal.record.texts import warnings_of
 from tankcal.tank.budgets import budget, reading_sources
 from tankcal.tank.capacity import Capacity
 from tankcal.tank.deliveries import worst_deliveries
@@ -194,7 +193,7 @@ def write_record(record, folder, language=None):
     outputs.refuse_foreign(folder)
     with folders.replace_folder(folder, language) as temporary:
         records.save(record, temporary / outputs.RECORD)
-        outputs.csv_files.write_tables(record, temporary)
+        outputs.write_tables(record, temporary)
     return [Path(folder) / outputs.RECORD]
 
 

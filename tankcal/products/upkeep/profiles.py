@@ -3,9 +3,8 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tankcal.job.contract.shorthand import choice, number
 from tankcal.job.entries import read_section
-from tankcal.job.fields import Field
+from tankcal.job.fields import Field, choice, number
 from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml
 from tankcal.job.tables import Log, nearest, read_bytes
 from tankcal.messages import message

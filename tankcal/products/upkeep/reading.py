@@ -12,9 +12,8 @@ import numpy as np
 from tankcal import record as records
 from tankcal.errors import InputError, Problem
 from tankcal.job.contract.keys import CSV
-from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.entries import read_columns
-from tankcal.job.fields import Field
+from tankcal.job.fields import Field, choice, number, positive
 from tankcal.job.folder import read_csv
 from tankcal.job.tables import Log, read_bytes, shown
 from tankcal.messages import message

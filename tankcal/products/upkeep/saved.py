@@ -4,8 +4,7 @@ from pathlib import Path
 
 from tankcal.record.covariance_factor import FactorBlock
 from tankcal.record.saved_formats import SavedFormat
-from tankcal.record.schema import Finite, Saved, key
-from tankcal.record.texts import WarningRecord
+from tankcal.record.schema import Finite, Saved, WarningRecord, key
 from tankcal.version import find_version
 
 UPKEEP = SavedFormat(

@@ -19,8 +19,7 @@ import numpy as np
 
 from tankcal import record as records
 from tankcal.errors import InputError, Problem, SolutionError
-from tankcal.job.contract.shorthand import choice, number, positive
-from tankcal.job.fields import Field
+from tankcal.job.fields import Field, choice, number, positive
 from tankcal.messages import message
 from tankcal.products.quantity.table import TankTable
 from tankcal.products.upkeep.causes import TableStock

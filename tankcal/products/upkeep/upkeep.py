@@ -25,7 +25,7 @@ from tankcal.products.upkeep.state import NO_STATE
 from tankcal.products.upkeep.steps import REASONS
 from tankcal.products.upkeep.watching import SIR_SD, suspect_clock, watch
 from tankcal.record.covariance_factor import blocks_of
-from tankcal.record.texts import warnings_of
+from tankcal.record.schema import warnings_of
 
 WIDE = 0.005  # relative u of the former contents above which only deliveries are stated
 GLOBAL_TEST = 1e-3  # least probability of chi-square for an improved table

@@ -16,10 +16,9 @@ from tankcal.job.tables import REGISTERS, TABLES
 from tankcal.products.desk.computing import Refusal
 from tankcal.products.desk.desk import Desk
 from tankcal.products.desk.display import Reader
-from tankcal.products.desk.draft import Draft
-from tankcal.products.desk.findings import BAD, DOUBTFUL
+from tankcal.products.desk.draft import BAD, DOUBTFUL, Draft
 from tankcal.products.desk.keys import SETTINGS
-from tankcal.products.workbench.pages import list_page, table_page, text_page
+from tankcal.products.workbench.panels import list_page, table_page, text_page
 from tankcal.report.folders import default_folder
 from tankcal.text.shipped import DEFAULT, nearest_language
 
@@ -251,7 +250,7 @@ class Results:
         self._desk = desk
 
     def _repr_mimebundle_(self, include=None, exclude=None):
-        from tankcal.products.workbench.pages import results_page
+        from tankcal.products.workbench.panels import results_page
 
         desk = self._desk
         return bundle(desk, "results_panel", "" if desk.is_live else results_page(desk))

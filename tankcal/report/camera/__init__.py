@@ -14,7 +14,7 @@ from tankcal.record import manifest
 from tankcal.record.camera_versions import KINDS
 from tankcal.report import folders
 from tankcal.report.camera.paper import CameraPaper, describe_origin
-from tankcal.report.outputs.csv_files import write_rows
+from tankcal.report.outputs import write_rows
 from tankcal.report.papers import write_papers
 
 __all__ = ["CameraPaper", "describe_origin", "lines", "refuse_foreign", "write"]

@@ -1,4 +1,4 @@
-"""Figures of the camera papers.
+"""Figures of the camera reports.
 
 They show comparisons of calibrations, parameters, check points, and the influence of calibrations.
 """
@@ -12,7 +12,7 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from tankcal.calibration.edges import decentring_profile, radial_curve
+from tankcal.calibration.interiors import decentring_profile, radial_curve
 from tankcal.camera.model import KEYS, PARAMETERS, Form
 from tankcal.report import numbers
 from tankcal.report.camera.influence import label, list_adjusted_runs

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from tankcal.job.rule_files import shipped_names, shipped_rule
 from tankcal.messages import message
-from tankcal.record.comparison import COMPARISON
+from tankcal.record.recalibration import COMPARISON
 from tankcal.report.comparison.tables import COURSES, DELIVERIES, ROWS, WATERFALL, unit_symbol
 from tankcal.report.plain import words_with_part
 from tankcal.report.saved_document import SavedDocument, SavedPaper, bearable, iso_day, signed_text
@@ -37,7 +37,7 @@ CODES = {  # {value of a reason: group of its words}
 
 
 class ComparisonPaper(SavedPaper):
-    """Formatter of a `record.comparison.ComparisonFile` in a language.
+    """Formatter of a `record.recalibration.ComparisonFile` in a language.
 
     Words are looked up in the part of a group under `comparison` first, then in the group.
 
@@ -151,8 +151,7 @@ def _variant(values):
 
 
 def _load_renderers():
-    from tankcal.report.comparison.pages import pages
-    from tankcal.report.comparison.workbook import write
+    from tankcal.report.comparison.paper import pages, write
 
     return pages, write
 

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.report import blocks
-from tankcal.report.dcc.elements import CERTIFICATE, DCC, ONE, clean
+from tankcal.report.dcc import DCC, ONE, ROOT, clean
 from tankcal.text.digits import NOTHING
 
 MOST_BYTES = 50_000_000
@@ -71,7 +71,7 @@ def read_certificate(path):
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         text = message("dcc_no_xml", "is no XML ({error})", error=str(error))
         raise _refusal(path, text) from error
-    if root.tag != f"{{{DCC}}}{CERTIFICATE}":
+    if root.tag != f"{{{DCC}}}{ROOT}":
         text = message("dcc_other_root", "is no digital calibration certificate ({ns})", ns=DCC)
         raise _refusal(path, text)
     return root

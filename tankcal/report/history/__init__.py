@@ -6,7 +6,7 @@ All values come from history.json; no number is computed here.
 from typing import ClassVar
 
 from tankcal.messages import message
-from tankcal.record.history import HISTORY
+from tankcal.record.recalibration import HISTORY
 from tankcal.report.history.tables import (
     CERTIFICATES,
     CHANGES,
@@ -36,7 +36,7 @@ TABLES = {
 
 
 class HistoryPaper(SavedPaper):
-    """Formatter of a `record.history.HistoryFile` in a language.
+    """Formatter of a `record.recalibration.HistoryFile` in a language.
 
     Words are looked up in the part of a group under `history` first, then in the group. The names
     of checks and steps are those of inspections and comparisons.

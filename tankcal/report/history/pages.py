@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from tankcal.report import blocks
 from tankcal.report.camera.figures import COLOURS, line_style, styled
-from tankcal.report.comparison.figures import draw_E_n_limits, typeset_E_n
+from tankcal.report.comparison.paper import draw_E_n_limits, typeset_E_n
 from tankcal.report.history.tables import (
     CERTIFICATES,
     CHANGES,

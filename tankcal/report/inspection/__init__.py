@@ -6,7 +6,7 @@ capacity certificate.
 
 from tankcal.messages import message
 from tankcal.record.inspection import INSPECTION
-from tankcal.report.inspection.paper import InspectionPaper
+from tankcal.report.inspection.tables import InspectionPaper
 from tankcal.report.saved_document import SavedDocument
 
 __all__ = ["DOCUMENT", "InspectionPaper", "rebuild", "refuse_foreign", "write_inspection"]

@@ -8,7 +8,7 @@ from pathlib import Path
 from tankcal.messages import message
 from tankcal.record import manifest
 from tankcal.report import folders
-from tankcal.report.planning.paper import DESIGN, PlanPaper
+from tankcal.report.planning.pages import DESIGN, PlanPaper
 
 __all__ = ["DESIGN", "FILES", "JOB", "PlanPaper", "refuse_foreign", "write"]
 
@@ -84,8 +84,7 @@ def write(
 def _write(paper, folder, progress, as_workbook):
     """Write the files of a PlanPaper or WallPaper."""
     from tankcal.report.planning import empty_job, files
-    from tankcal.report.planning.field_sheets import sheets
-    from tankcal.report.planning.outlook import outlook
+    from tankcal.report.planning.pages import outlook, sheets
     from tankcal.report.planning.wall_paper import wall_outlook, wall_sheets
 
     write_job, write_tables, write_book = empty_job.write, files.write_files, files.write_sheets

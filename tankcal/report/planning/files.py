@@ -9,10 +9,9 @@ from tankcal.record import save
 from tankcal.record.plan import plain_of, plain_of_wall
 from tankcal.report import numbers
 from tankcal.report.plain import Column
-from tankcal.report.planning import sketches
-from tankcal.report.planning.rows import field_tables, place_of_change
-from tankcal.report.planning.stands import stands
-from tankcal.report.planning.wall_rows import field_tables_of_wall
+from tankcal.report.planning import figures
+from tankcal.report.planning.figures import stands
+from tankcal.report.planning.rows import field_tables, field_tables_of_wall, place_of_change
 from tankcal.report.workbook.book import workbook_head
 from tankcal.report.workbook.look import Column as Cells
 from tankcal.report.workbook.sections import CellTable, Picture, SheetContent, write_workbook
@@ -24,7 +23,7 @@ ONE_PER_SHEET = (
 )
 LANDSCAPE = ("ties", "setups", "circumferences", "runs", "tangents")
 EQUIPMENT = ("cameras", "instruments")
-SKETCHES = {"wall": sketches.wall, "stands": stands}
+SKETCHES = {"wall": figures.wall, "stands": stands}
 FIRST = {"targets": ("point", "line", "row")}  # columns of a sheet before those of the paper
 COUNTED = ("line", "row", "course")  # columns of names that sort as numbers if they are numbers
 LONGEST = 30  # letters of a column without wrapped text

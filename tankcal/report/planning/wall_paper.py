@@ -2,15 +2,21 @@
 
 import numpy as np
 
-from tankcal.planning.changes import cost_of
+from tankcal.planning.improvements import cost_of
 from tankcal.planning.wall.changes import NUMBERED
 from tankcal.record.plan import survey_of
 from tankcal.report import blocks
 from tankcal.report.numbers import symbol
 from tankcal.report.plain import Column
-from tankcal.report.planning.outlook import changes, design, result, simulated_surveys, table
-from tankcal.report.planning.paper import PlanPaper
-from tankcal.report.planning.wall_rows import COURSES, DIP, courses_of, field_tables_of_wall
+from tankcal.report.planning.pages import (
+    PlanPaper,
+    changes,
+    design,
+    result,
+    simulated_surveys,
+    table,
+)
+from tankcal.report.planning.rows import COURSES, DIP, courses_of, field_tables_of_wall
 from tankcal.text.words import name_of_input
 
 COUNTED = (

@@ -4,7 +4,7 @@ import numpy as np
 
 from tankcal.record.columns import ArrayRows
 from tankcal.report import blocks
-from tankcal.report.tables.readings import GROUPS, MOST_IN_SHEET, READINGS, convert_units
+from tankcal.report.tables.survey import GROUPS, MOST_IN_SHEET, READINGS, convert_units
 from tankcal.text import words
 from tankcal.text.digits import NOTHING
 

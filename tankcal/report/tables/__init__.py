@@ -4,7 +4,7 @@ A `Table` defines its columns and the rows that it takes from a record. The writ
 
     paper (notebook, PDF, web page, terminal)  `plain.PlainPaper.show`, which returns a block
     workbook                                   `workbook.tables.columns_of`
-    CSV                                        `outputs.csv_files.write_table`
+    CSV                                        `outputs.write_table`
 
 A new column requires a line in a module of this package, or in `tables` of a method, and a heading
 in each language.

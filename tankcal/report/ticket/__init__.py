@@ -10,7 +10,7 @@ from tankcal.record.ticket import TICKET
 from tankcal.report import blocks
 from tankcal.report.plain import words_with_part
 from tankcal.report.saved_document import SavedDocument, SavedPaper, bearable
-from tankcal.report.ticket.tables import BUDGET, QUANTITIES, STEPS, UNCERTAINTIES
+from tankcal.report.ticket.pages import BUDGET, QUANTITIES, STEPS, UNCERTAINTIES
 from tankcal.text.shipped import DEFAULT
 from tankcal.text.words import load_words, message_sentence
 

@@ -1,32 +1,35 @@
 """The ticket as XML, in the elements of the digital calibration certificate (docs/ticket.md)."""
 
 import tankcal
-from tankcal.report.dcc.administrative import (
-    NAMESPACE,
-    UNKNOWN_COUNTRY,
-    add_identification,
-    add_software,
-    add_statement,
-)
-from tankcal.report.dcc.elements import (
+from tankcal.report.dcc import (
     CELSIUS,
-    CERTIFICATE,
     CUBIC_METRE,
     DENSITY,
     KILOGRAM,
     METRE,
+    NAMESPACE,
     ONE,
+    ROOT,
+    UNKNOWN_COUNTRY,
     Languages,
     add_child,
     add_contact,
+    add_identification,
     add_real,
+    add_software,
+    add_statement,
     add_text,
     clean,
     make_root,
     serialize,
 )
-from tankcal.report.ticket.pages import comparison_text, notes, warnings_text
-from tankcal.report.ticket.tables import QUANTITY_UNITS, source_of
+from tankcal.report.ticket.pages import (
+    QUANTITY_UNITS,
+    comparison_text,
+    notes,
+    source_of,
+    warnings_text,
+)
 from tankcal.text.shipped import LANGUAGES
 
 _UNITS = {"m3": CUBIC_METRE, "kg": KILOGRAM, "kg/m3": DENSITY, "degC": CELSIUS, "": ONE}
@@ -46,7 +49,7 @@ def ticket_xml(paper):
     first = paper.words["language"]["code"]
     codes = [first, *(code for code in LANGUAGES if code != first)]
     languages = Languages(type(paper)(paper.saved, code) for code in codes)
-    root = make_root(CERTIFICATE)
+    root = make_root(ROOT)
     _administrative(add_child(root, "administrativeData"), languages, paper)
     _results(add_child(root, "measurementResults"), languages, paper.record)
     return serialize(root)

@@ -11,15 +11,17 @@ from tankcal.record.covariance_factor import factor_of
 from tankcal.report.blocks import Block
 from tankcal.report.numbers import unit
 from tankcal.report.uncertainty.capacity import ends_of_high_legs
-from tankcal.report.uncertainty.sources import (
+from tankcal.report.uncertainty.stated import (
     critical_zone,
+    flag_simulated,
     groups_of,
     is_roof_in_table,
     read_room_levels,
     roof_of,
+    stated_rows,
+    stated_U_m3,
 )
-from tankcal.report.uncertainty.stated import flag_simulated, stated_rows, stated_U_m3
-from tankcal.report.web.packing import pack_numbers
+from tankcal.report.web import pack_numbers
 from tankcal.tank.fittings import AIR_KG_M3, WEIGHTS_KG_M3
 from tankcal.tank.gauging import (
     FIELDS_OF_U,
@@ -31,7 +33,7 @@ from tankcal.tank.gauging import (
     VCF_K,
     VCF_PERCENT,
 )
-from tankcal.tank.volume_correction import brazil, petroleum
+from tankcal.tank.volume_correction import petroleum
 from tankcal.tank.volume_correction.corrections import LEAST_C, MOST_C
 from tankcal.text.digits import decimals_of_rows
 from tankcal.uncertainty import coverage_factor
@@ -201,7 +203,7 @@ def _correction_constants():
         "60F": petroleum.GROUPS_60F,
         "2004": petroleum.GROUPS_2004,
     }
-    bounds = [float(bound) for bound in brazil.CLASSES[:-1, 0]] + [brazil.MOST]
+    bounds = [float(bound) for bound in petroleum.CLASSES[:-1, 0]] + [petroleum.MOST]
     return {
         "bases_c": petroleum.BASES_C,
         "glass": petroleum.GLASS_EXPANSION,
@@ -227,12 +229,12 @@ def _correction_constants():
         "middle": petroleum.MIDDLE_KG_M3,
         "constant_c": [LEAST_C, MOST_C],
         "brazil": {
-            "classes": [[bound, *map(float, brazil.coefficients_of_class(bound))]
+            "classes": [[bound, *map(float, petroleum.coefficients_of_class(bound))]
                         for bound in bounds],
-            "least": brazil.LEAST,
-            "most": brazil.MOST,
-            "limits_c": [brazil.LOWEST_C, brazil.HIGHEST_C],
-            "three_to": brazil.THREE_DECIMALS_TO,
-            "four_from": brazil.FOUR_DECIMALS_FROM,
+            "least": petroleum.LEAST,
+            "most": petroleum.MOST,
+            "limits_c": [petroleum.LOWEST_C, petroleum.HIGHEST_C],
+            "three_to": petroleum.THREE_DECIMALS_TO,
+            "four_from": petroleum.FOUR_DECIMALS_FROM,
         },
     }  # fmt: skip

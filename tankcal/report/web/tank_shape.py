@@ -11,7 +11,7 @@ import numpy as np
 
 from tankcal.report.blocks import Block
 from tankcal.report.plots.style import round_factor
-from tankcal.report.web.packing import pack_numbers
+from tankcal.report.web import pack_numbers
 from tankcal.report.web.wall_map import limit_rejected
 
 MOST_POINTS = 4000  # largest number of drawn points

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.report.blocks import Block
-from tankcal.report.web.packing import pack_numbers
+from tankcal.report.web import pack_numbers
 
 MOST_POINTS = 4000  # largest number of drawn points
 MOST_REJECTED = 2000  # largest number of drawn rejected points

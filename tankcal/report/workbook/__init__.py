@@ -9,33 +9,29 @@ from tankcal.report.workbook.book import Book
 from tankcal.report.workbook.calculator import calculator_sheets, factor_sheets
 from tankcal.report.workbook.capacity import (
     capacity_sheet,
+    charts_sheets,
     densities_sheet,
     millimetres_sheet,
     proportional_parts_sheet,
     roof_sheet,
 )
-from tankcal.report.workbook.certificate import certificate_sheet
-from tankcal.report.workbook.charts import charts_sheets
 from tankcal.report.workbook.papers import (
+    adjustment_sheet,
+    budget_sheet,
+    cameras_sheet,
+    certificate_sheet,
     corrections_sheet,
+    deliveries_sheet,
     inside_sheet,
+    monte_carlo_sheet,
+    observations_sheet,
+    points_sheet,
     provenance_sheet,
+    rule_sheet,
     ship_sheet,
     tables_sheets,
 )
 from tankcal.report.workbook.quantity import quantity_sheets
-from tankcal.report.workbook.survey import (
-    adjustment_sheet,
-    cameras_sheet,
-    observations_sheet,
-    points_sheet,
-)
-from tankcal.report.workbook.uncertainty import (
-    budget_sheet,
-    deliveries_sheet,
-    monte_carlo_sheet,
-    rule_sheet,
-)
 from tankcal.text.words import language_of, load_words, translate_record
 
 # Sheets for other programs, which would print on hundreds of pages: hidden.

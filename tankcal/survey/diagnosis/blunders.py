@@ -25,12 +25,16 @@ from scipy.special import betainc
 
 from tankcal.errors import Problem, SolutionError
 from tankcal.messages import join_with_or, list_some, message
-from tankcal.survey.diagnosis.diagnoses import find_swapped_points, mirrored_fits, mirrored_photo
-from tankcal.survey.diagnosis.double_names import image_point_label
+from tankcal.survey.diagnosis.diagnoses import (
+    find_swapped_points,
+    image_point_label,
+    mirrored_fits,
+    mirrored_photo,
+)
 from tankcal.survey.network import adjust, snoop
 from tankcal.survey.network.assembly import assemble
 from tankcal.survey.network.blocks import CORRELATED
-from tankcal.survey.network.separability import alternatives
+from tankcal.survey.network.reliability import alternatives
 from tankcal.survey.network.snooping import kept_rows, set_use, start_from_adjusted
 from tankcal.survey.network.survey import IMAGES
 from tankcal.survey.observations import Directions, Distances

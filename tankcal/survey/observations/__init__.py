@@ -10,16 +10,6 @@ of the class: `instrument`, `set`, `origin`, `horizontal`, `rise_m`, `bend_per_m
 from dataclasses import dataclass, field
 
 from tankcal.survey.observations.base import NUISANCES, Layout, Observations, Source, State, Trace
-from tankcal.survey.observations.coordinates import (
-    Block,
-    ControlCoordinates,
-    Correlated,
-    HeightDifferences,
-    KnownUnknowns,
-    PlumbLines,
-    SystemCoordinates,
-    Vectors,
-)
 from tankcal.survey.observations.photographs import (
     HeldOrientation,
     ImageCoordinates,
@@ -28,10 +18,18 @@ from tankcal.survey.observations.photographs import (
 )
 from tankcal.survey.observations.sights import (
     Azimuths,
+    Block,
+    ControlCoordinates,
+    Correlated,
     Directions,
     Distances,
+    HeightDifferences,
     HorizontalAngles,
+    KnownUnknowns,
+    PlumbLines,
     Sights,
+    SystemCoordinates,
+    Vectors,
     VerticalAngles,
 )
 

@@ -28,7 +28,6 @@ from tankcal.adjust import Damping, gauss_newton
 from tankcal.geometry.rotations import apply_small_rotation
 from tankcal.messages import message
 from tankcal.survey.observations import HeightDifferences
-from tankcal.survey.start.clues import grow_piece
 from tankcal.survey.start.photographs import (
     ENOUGH,
     WORST_ERROR,
@@ -37,7 +36,7 @@ from tankcal.survey.start.photographs import (
     grow_by_photos,
     resect,
 )
-from tankcal.survey.start.pieces import BAD_JOINT, Motion, certain_places, empty, joint
+from tankcal.survey.start.pieces import BAD_JOINT, Motion, certain_places, empty, grow_piece, joint
 
 STEPS = 30  # of the alignment from one start
 FAR = 5.0  # largest step of the logarithm of the scale

@@ -19,8 +19,7 @@ from tankcal.errors import reason_of
 from tankcal.geometry.field.estimate import LEVELS
 from tankcal.messages import message
 from tankcal.quadrature import height_basis
-from tankcal.tank.meshes.checks import closed_mesh, holds, problem
-from tankcal.tank.meshes.part import Mesh, MeshPart, mesh_part
+from tankcal.tank.meshes.part import Mesh, MeshPart, closed_mesh, holds, mesh_part, problem
 from tankcal.tank.volumes import gauss_levels
 from tankcal.units import FULL_TURN
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tankcal.camera.focus import RADIAL
+from tankcal.camera.model import RADIAL
 from tankcal.job.cameras import (
     ASSUMED_CONVENTION,
     affinity_of,

@@ -5,17 +5,17 @@ from scipy.special import chdtri
 
 from tankcal.camera.comparator import GROSS, KINDS, find_mark_error
 from tankcal.errors import SolutionError
-from tankcal.job.cameras import image_frames
-from tankcal.job.checking import has_rows, is_not_given, refuse_repeated, tell
-from tankcal.job.checks.survey.files import refuse_undefined, tell_rows
-from tankcal.job.contract.registers import MARKS
-from tankcal.job.imagery import (
+from tankcal.job.cameras import (
     cameras_of_photos,
+    image_frames,
     imagery_of,
     is_surface,
     readings_of_marks,
     surfaces_of,
 )
+from tankcal.job.checking import has_rows, is_not_given, refuse_repeated, tell
+from tankcal.job.checks.survey.readings import refuse_undefined, tell_rows
+from tankcal.job.contract.registers import MARKS
 from tankcal.job.tables import nearest
 from tankcal.messages import join_with_and, join_with_or, list_some, message
 

@@ -6,19 +6,17 @@ from tankcal.job.cameras import datum_point
 from tankcal.job.checking import has_rows, is_not_given, refuse_repeated, tell
 from tankcal.job.checks.survey.cameras import check_cameras, check_depth_of_field
 from tankcal.job.checks.survey.doubtful import check_doubtful
-from tankcal.job.checks.survey.files import (
-    SurveyFiles,
-    all_points,
-    check_names,
-    observed_names,
-    tell_rows,
-)
 from tankcal.job.checks.survey.images import check_images
 from tankcal.job.checks.survey.readings import (
+    SurveyFiles,
+    all_points,
     check_correlated,
     check_instruments,
+    check_names,
     check_readings,
     check_stadia,
+    observed_names,
+    tell_rows,
 )
 from tankcal.job.contract.observations import ANGLES, READINGS
 from tankcal.job.tables import nearest

@@ -19,19 +19,27 @@ rounded height is accepted as input for this row. A dip above both heights is re
 from dataclasses import dataclass
 
 from tankcal.report.uncertainty.capacity import ends_of_high_legs
-from tankcal.report.workbook.calculator import delivery, reverse, service
-from tankcal.report.workbook.calculator.cells import (
+from tankcal.report.workbook.calculator import delivery, service
+from tankcal.report.workbook.calculator.service import (
+    CODES,
+    KEYS,
+    SHELL_C,
+    number,
+    refused_word,
+    sentences,
+)
+from tankcal.report.workbook.calculator.table import (
     NANOMETRE,
     VALUES,
     Line,
     Places,
+    Table,
+    column_names,
+    factor_sheets,
     if_number,
     is_no_number,
     quoted,
 )
-from tankcal.report.workbook.calculator.sentences import KEYS, number, refused_word, sentences
-from tankcal.report.workbook.calculator.service import CODES, SHELL_C
-from tankcal.report.workbook.calculator.table import Table, column_names, factor_sheets
 from tankcal.report.workbook.look import ACCENT, INPUT, MUTED, number_format
 from tankcal.text.digits import LITRE_DECIMALS, NOTHING, bound_of_decimals, fixed, shortest
 from tankcal.text.words import marks_of, name_of_input
@@ -98,7 +106,7 @@ def _results(book, table):
     blocks = [
         Block("volume", results(table, words)),
         Block("service", service.results(table)),
-        Block("reverse", reverse.results(table)),
+        Block("reverse", delivery.reverse_results(table)),
     ]
     if table.capacity["inputs"]:
         blocks.append(Block("delivery", delivery.results(table, words)))
@@ -122,7 +130,7 @@ def _workings(book, table):
         Block("checks", service.checks(number)),
         Block("product", service.product_lines()),
         Block("head", service.head_lines(table, number, density) + service.roof_lines(table)),
-        Block("finding_volume", reverse.finding(table, number)),
+        Block("finding_volume", delivery.finding(table, number)),
     ]
     blocks[0].lines[:0] = ends(table)
     if table.capacity["inputs"]:

@@ -1,19 +1,77 @@
-"""A delivery between two dips with its U, in which common errors of both dips cancel.
+"""A delivery between two dips with its U, the coverage factor, and the dip of a volume.
+
+Formulas of the coverage factor for integer and non-integer degrees of freedom v.
+
+The function TINV truncates degrees of freedom to integers, unlike the record. Up to v = 1000,
+Student's t follows exactly from the beta distribution, since t^2 / (v + t^2) is Beta(1/2, v/2).
+Above, Fisher's expansion is used up to the fourth power of 1/v. Source: Abramowitz and Stegun,
+Handbook of Mathematical Functions, 26.5.27 and 26.7.5.
+
+A delivery between two dips with its U, in which common errors of both dips cancel.
 
 u^2 is the sum of squares of f(high) - f(low). f is a row of the covariance factor, interpolated
 linearly between rows. k follows from the Welch-Satterthwaite formula over the sources
 (tankcal.tank.deliveries).
+
+Dip of a volume, by linear interpolation between two rows of the table.
+
+A volume with more than one dip (rows of equal volume) has no result.
 """
 
 import math
+from bisect import bisect_left, bisect_right
 
 import numpy as np
 
-from tankcal.report.workbook.calculator.cells import Line, if_number, quoted
-from tankcal.report.workbook.calculator.coverage import normal, student
-from tankcal.report.workbook.calculator.table import factor_formula
+from tankcal.report.workbook.calculator.table import (
+    NANOMETRE,
+    Line,
+    factor_formula,
+    if_number,
+    is_no_number,
+    quoted,
+)
 from tankcal.text.digits import LITRE_DECIMALS, NOTHING
 from tankcal.uncertainty import dof_of, least_of, sum_of_fourths
+
+_MOST_BETA = 1000  # largest degrees of freedom for the beta distribution
+_TERMS = (  # terms of the expansion: divisor, and coefficients of z, z^3, z^5, ...
+    (4, (1, 1)),
+    (96, (3, 16, 5)),
+    (384, (-15, 17, 19, 3)),
+    (92160, (-945, -1920, 1482, 776, 79)),
+)
+
+
+def normal(probability):
+    """Return the formula of k for infinite degrees of freedom."""
+    return f"NORMSINV((1+{probability!r})/2)"
+
+
+def student(probability, dof, z):
+    """Return the formula of k for finite degrees of freedom.
+
+    Parameters
+    ----------
+    probability : float
+        Coverage probability.
+    dof : str
+        Cell of the degrees of freedom.
+    z : str
+        Cell with k of the normal distribution (`normal`).
+
+    Returns
+    -------
+    str
+    """
+    beta = f"BETAINV({probability!r},0.5,{dof}/2)"
+    expansion = "0"
+    # Horner's scheme in 1/dof, from the highest power.
+    for divisor, coefficients in reversed(_TERMS):
+        inner = "+".join(f"{c}*{z}^{2 * place + 1}" for place, c in enumerate(coefficients))
+        expansion = f"(({inner})/{divisor}+{expansion})/{dof}"
+    return f"IF({dof}>{_MOST_BETA},{z}+{expansion},SQRT({dof}*{beta}/(1-{beta})))"
+
 
 _INFINITE = "1E+99"  # replaces infinite degrees of freedom in the workings
 _SHOWN_INFINITE = "1E+15"  # degrees of freedom above which the form prints the sign of infinity
@@ -185,3 +243,80 @@ def results(table, words):
             "0.000 %",
         ),
     ]
+
+
+_CUBIC_MICROMETRE = "1E-12"  # m³; tolerance for rounding
+
+
+def finding(table, number):
+    """Return the lines that determine the dip of the input `wanted` (list of Line)."""
+    top = "MAX(MAX(capacity_volume),ROUND(MAX(capacity_volume),3))"
+    inside = "IF([wanted_first]<[wanted_row],#no_single_dip,#wanted_within)"
+    if table.critical is not None:
+        low, high = table.critical
+        zone = f"AND([wanted_dip]>{low!r}+{NANOMETRE},[wanted_dip]<{high!r}-{NANOMETRE})"
+        inside = f"IF({zone},#wanted_critical,{inside})"
+    if not table.rises:
+        inside = "#volumes_fall"
+    low, high = "INDEX(capacity_volume,[wanted_row])", "INDEX(capacity_volume,[wanted_next])"
+    below, above = "INDEX(capacity_height,[wanted_row])", "INDEX(capacity_height,[wanted_next])"
+    row, first = _rows(table)
+    return [
+        Line(
+            "wanted_typed",
+            f"IF(ISBLANK([wanted]),#wanted_blank,IF({is_no_number('[wanted]')},#no_number,"
+            f"IF([wanted]<MIN(capacity_volume)-{_CUBIC_MICROMETRE},#wanted_below,"
+            f"IF([wanted]>{top}+{_CUBIC_MICROMETRE},#wanted_above,#wanted_within))))",
+            number("wanted_within"),
+            0,
+        ),
+        _when_typed(
+            "wanted_row",
+            "MATCH(MAX([wanted],MIN(capacity_volume)),capacity_volume,1)",
+            row + 1,
+        ),
+        _when_typed(
+            "wanted_next", "MIN([wanted_row]+1,ROWS(capacity_volume))", table.after(row) + 1
+        ),
+        _when_typed(
+            "wanted_first",
+            f"IF([wanted]-{low}<={_CUBIC_MICROMETRE},MATCH({low},capacity_volume,0),[wanted_row])",
+            first + 1,
+        ),
+        _when_typed(
+            "wanted_dip",
+            f"IF(OR([wanted_next]=[wanted_row],[wanted]<={low}),{below},"
+            f"{below}+([wanted]-{low})/({high}-{low})*({above}-{below}))",
+            table.height_m[row],
+            6,
+            "m",
+        ),
+        _when_typed("wanted_state", inside, number(_state(table)), otherwise="[wanted_typed]"),
+    ]
+
+
+def _rows(table):
+    """Return (last, first) row with the initial volume."""
+    volume = table.volume_m3[table.at]
+    last = bisect_right(table.volume_m3, volume) - 1
+    return last, min(bisect_left(table.volume_m3, volume), last)
+
+
+def _state(table):
+    """Return the key of the sentence on the initial volume."""
+    row, first = _rows(table)
+    if not table.rises:
+        return "volumes_fall"
+    return "no_single_dip" if first < row else "wanted_within"
+
+
+def _when_typed(key, expression, result, digits=0, unit="", otherwise='"–"'):
+    formula = f"IF([wanted_typed]=#wanted_within,{expression},{otherwise})"
+    return Line(key, formula, result, digits, unit)
+
+
+def reverse_results(table):
+    """Return the line of the dip of the volume, in a list."""
+    formula = 'IF([wanted_state]=#wanted_within,[wanted_dip],"–")'
+    result = table.height_m[table.at] if _state(table) == "wanted_within" else NOTHING
+    return [Line("dip_of_volume", formula, result, table.digits + 1, "m", strong=True)]

@@ -1,4 +1,6 @@
-"""Volume in service: other temperature of the shell, other liquid, and volume of the product.
+"""Volume in service, and sentences of the calculator on its input.
+
+Volume in service: other temperature of the shell, other liquid, and volume of the product.
 
     V = (V table + head) CTSh + roof,   V at the reference temperature of the product = V * VCF
 
@@ -14,16 +16,21 @@ Groups of products, and the factor of volume correction to 15 °C.
 rho is the density at 15 °C. Source: ASTM D1250-80, API Standard 2540, IP 200, Tables 54A (crude
 oil) and 54B (products). docs/workbook.md lists the printed values of the comparison. The tables
 round intermediate results, this module does not; four printed decimals agree.
+
+Sentences of the calculator on its input, with numbers.
+
+The first sentences concern valid input; all others begin with the word for "refused".
 """
 
 from dataclasses import dataclass
 from itertools import pairwise
 
-from tankcal.report.uncertainty.sources import roof_of
-from tankcal.report.workbook.calculator.cells import NANOMETRE, Line, if_number, is_no_number
+from tankcal.report.uncertainty.stated import roof_of
+from tankcal.report.workbook.calculator.table import NANOMETRE, Line, if_number, is_no_number
 from tankcal.report.workbook.capacity import name_of_density
 from tankcal.tank.fittings import AIR_KG_M3, WEIGHTS_KG_M3, floating_roof
-from tankcal.text.digits import LITRE_DECIMALS, NOTHING
+from tankcal.text.digits import LITRE_DECIMALS, NOTHING, fixed, shortest
+from tankcal.text.words import marks_of
 
 SHELL_C = (-50.0, 150.0)  # limits of the temperature of the shell
 
@@ -304,3 +311,57 @@ def factor(expansion, temperature):
     """Return the formula of the factor for cells with a and the temperature of the liquid."""
     step = f"({temperature}-{BASE_C!r})"
     return f"EXP(-{expansion}*{step}*(1+0.8*{expansion}*{step}))"
+
+
+GOOD = (
+    "within", "fine", "shell_fine", "wanted_within", "not_used", "product_none", "density_left_out",
+    "head_single", "head_unknown", "head_applied", "delivery", "no_delivery",
+)  # fmt: skip
+REFUSED = (
+    "dip_blank", "no_number", "below", "above", "critical", "wanted_blank", "wanted_below",
+    "wanted_above", "wanted_critical", "no_single_dip", "volumes_fall", "shell_blank",
+    "shell_range", "product_unknown", "density_blank", "density_range", "liquid_blank",
+    "liquid_range", "factor_blank", "factor_range", "head_outside", "swapped",
+)  # fmt: skip
+KEYS = (*GOOD, *REFUSED)
+
+
+def number(key):
+    """Return the number of a sentence, from 1."""
+    return KEYS.index(key) + 1
+
+
+def sentences(book, table):
+    """Return all sentences in the order of `KEYS` (list of str)."""
+    marks = marks_of(book.words)
+    heights, volumes = table.height_m, table.volume_m3
+    critical = table.critical or (0.0, 0.0)
+    values = {
+        "first": fixed(heights[0], table.digits, marks),
+        "last": fixed(heights[-1], table.digits, marks),
+        "least": fixed(min(volumes), 3, marks),
+        "most": fixed(max(volumes), 3, marks),
+        "critical_low": fixed(critical[0], table.digits, marks),
+        "critical_high": fixed(critical[1], table.digits, marks),
+        "light": shortest(min(table.densities), marks),
+        "heavy": shortest(max(table.densities), marks),
+        "own": shortest(table.densities[0], marks),
+        "cold": shortest(LEAST_C, marks),
+        "hot": shortest(MOST_C, marks),
+        "shell_cold": shortest(SHELL_C[0], marks),
+        "shell_hot": shortest(SHELL_C[1], marks),
+        "temperature": shortest(table.job["table"]["reference_temperature_c"], marks),
+        "densities": book.sheet_name("other_densities"),
+        "deliveries": book.sheet_name("deliveries"),
+    }
+    texts = [book.word(f"sentences.{key}", of="calculator", **values) for key in KEYS]
+    refused = refused_word(book)
+    return [
+        f"{refused} {text}" if key in REFUSED else text
+        for key, text in zip(KEYS, texts, strict=True)
+    ]
+
+
+def refused_word(book):
+    """Return the first word of all refusals."""
+    return book.word("texts.refused", of="calculator")

@@ -6,12 +6,11 @@ form or by Newton iterations, and U by analytic sensitivities. Results outside a
 
 from dataclasses import dataclass
 
-from tankcal.report.uncertainty.sources import read_room_levels
-from tankcal.report.workbook.calculator.cells import Places, quoted
-from tankcal.report.workbook.calculator.sentences import refused_word
-from tankcal.report.workbook.calculator.table import Table
+from tankcal.report.uncertainty.stated import read_room_levels
+from tankcal.report.workbook.calculator.service import refused_word
+from tankcal.report.workbook.calculator.table import Places, Table, quoted
 from tankcal.report.workbook.look import ACCENT, INPUT, LINE_PT, MUTED, number_format
-from tankcal.report.workbook.quantity import correction, gauging, uncertainty
+from tankcal.report.workbook.quantity import correction, uncertainty
 from tankcal.report.workbook.quantity.correction import NONE, STATES
 from tankcal.tank.gauging import FIELDS_OF_U, UNCERTAINTIES, UNITS_OF_U
 from tankcal.text.digits import NOTHING, fixed, shortest
@@ -100,7 +99,7 @@ def quantity_sheets(book, record):
         *correction.codes(),
         *correction.checks(number),
         *correction.density_rows(number),
-        *gauging.rows(record, number),
+        *correction.rows(record, number),
         *uncertainty.rows(table),
     ]
     rows, results = _addresses(workings)

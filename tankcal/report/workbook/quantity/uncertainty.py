@@ -8,8 +8,8 @@ import math
 from dataclasses import replace
 from itertools import pairwise
 
-from tankcal.report.uncertainty.sources import read_room_levels, roof_of
-from tankcal.report.workbook.calculator.coverage import normal, student
+from tankcal.report.uncertainty.stated import read_room_levels, roof_of
+from tankcal.report.workbook.calculator.delivery import normal, student
 from tankcal.report.workbook.calculator.table import factor_formula
 from tankcal.report.workbook.quantity.correction import (
     NONE,
@@ -18,9 +18,9 @@ from tankcal.report.workbook.quantity.correction import (
     Cell,
     Row,
     cell_row,
+    interpolation_formulas,
     state_row,
 )
-from tankcal.report.workbook.quantity.gauging import interpolation_formulas
 from tankcal.tank.fittings import AIR_KG_M3, WEIGHTS_KG_M3
 from tankcal.tank.gauging import ROOMS, VCF_AT_K, VCF_K, VCF_PERCENT
 from tankcal.uncertainty import least_of
