@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_stations import DRAWING, SizedStock, nominal_sizes, section_volume
 from page_figures import agree, figures_of
-from station_years import METERS, SURVEY, draw_year, make_table
+from station_years import METERS, draw_year, make_table
+from test_upkeep_planning import make_known_form, make_steps
 
 from tankcal.products.quantity.table import TankTable
 from tankcal.products.upkeep.causes import PRIORS, Meter, Operation, TableStock
@@ -50,26 +50,27 @@ def estimate_design(operation, steps):
     return balance.causes, triangle.root @ triangle.root.T, balance
 
 
-def station_row(year, *, groups=6, sizes=DRAWING, meter=0.0015, level_mm=0.12, days=730):
-    """u of five sizes in mm, of three contents in L, and of 0.5 to 2.0 m in ppm."""
-    day = year.steps.marks.time_ns / 86400e9
-    steps = year.steps.part(0, int(np.searchsorted(day, days)) - 1)
+def station_row(steps, *, groups=6, sizes=(), meter=0.0015, level_mm=0.12, days=730, zero_mm=0.0):
+    """u of five sizes in mm, of three contents in L, and of 0.5 to 2.0 m in ppm; r of two pairs."""
+    day = steps.marks.time_ns / 86400e9
+    steps = steps.part(0, int(np.searchsorted(day, days)) - 1)
     if groups < len(GROUPS):
         reason = np.where(steps.tickets > 0, REASONS.index("no_ticket"), 0)
         steps = replace(steps, reason=reason)
-    stock = SizedStock(section_volume, nominal_sizes(), sizes, make_table(sizes))
+    stock = make_known_form(**dict(sizes))
     meters = {name: Meter(name, u_factor=meter if groups > 1 else 0.0) for name in METERS}
-    prior = priors_of(groups) | {"level_mm": level_mm}
-    operation = Operation(stock, meters, prior, year.operation.air, start_ns=0)
+    prior = priors_of(groups) | {"level_mm": level_mm, "gauge_zero_mm": zero_mm}
+    operation = Operation(stock, meters, prior, start_ns=0)
     _, covariance, _ = estimate_design(operation, steps)
-    part = covariance[:5, :5]
-    u = 1000 * np.array(list(sizes.values())) * np.sqrt(np.diag(part))
+    part, sd = covariance[:5, :5], np.sqrt(np.diag(covariance)[:5])
+    u = 1000 * np.array(list(stock.sd.values())) * sd * [0.5, 1, 1, 1, 1]  # of the radius
     dips = np.array([0.5, 1.25, 2.2, 2.0])
-    columns = stock.columns(dips, np.zeros(5))
+    columns = stock.columns(dips, stock.at)[:, :5]
     between = columns[3] - columns[0]
-    delivered = np.diff(stock.volume_m3(dips[[0, 3]], np.zeros(5)))[0]
+    delivered = np.diff(stock.volume_m3(dips[[0, 3]], stock.at))[0]
     contents = 1000 * np.sqrt(np.einsum("ij,jk,ik->i", columns[:3], part, columns[:3]))
-    return [*u, *contents, 1e6 * np.sqrt(between @ part @ between) / delivered]
+    delivery = 1e6 * np.sqrt(between @ part @ between) / delivered
+    return [*u, *contents, delivery, part[4, 3] / sd[4] / sd[3], part[1, 0] / sd[1] / sd[0]]
 
 
 def sd_of_causes(year, days):
@@ -155,6 +156,9 @@ def upright_row(*, common=0.002, own=0.001, meter=300e-6, rack=1000e-6, mean_k=0
 
 # ---- the tables of the page
 
+SURVEY = {"u_diameter_mm": 2.0, "u_length_mm": 6.0, "u_end_depth_mm": 10.0,
+          "u_tilt_mm_per_m": 2.0, "u_zero_mm": 1.0}  # fmt: skip
+ORDERS = 2.3, 11.8  # stocks in m3: levels 0.35 to 1.92 m, 274 deliveries
 STATION_CASES = [
     (
         "docs/studies/upkeep.md",
@@ -213,6 +217,11 @@ STATION_CASES = [
     ),
     (
         "docs/studies/upkeep.md",
+        "| complete, zero of the gauge 2 mm | () | () | () | () | () | () | () | () | () |",
+        {"zero_mm": 2.0},
+    ),
+    (
+        "docs/studies/upkeep.md",
         "| complete, 60 days | () | () | () | () | () | () | () | () | () |",
         {"days": 60},
     ),
@@ -260,16 +269,23 @@ STOCKS = {"order_m3": (2.8, 12.4), "load_m3": 13.27}  # levels 0.42 to 1.92 m, 2
 
 def rows_of_tables():
     """Yield (page, row with () for its numbers, values) of each row of the three tables."""
-    year = draw_year(np.random.default_rng(1), make_table(DRAWING), days=730, sizes=DRAWING,
-                     **STOCKS)  # fmt: skip
+    _, steps = make_steps(730, ORDERS)
     for page, row, values in STATION_CASES:
-        yield page, row, station_row(year, **values)
+        yield page, row, station_row(steps, **values)[:9]
     year = draw_year(np.random.default_rng(1), make_table(), days=548, **STOCKS)
     for days in (8, 15, 29, 92, 183):
         row = ("docs/studies/upkeep.md", "| () days | () | () | () | () |")
         yield row[0], row[1].replace("()", str(days), 1), sd_of_causes(year, days)
     for page, row, values in UPRIGHT_CASES:
         yield page, row, upright_row(**values)
+
+
+@pytest.mark.slow
+def test_correlations_of_the_other_author():
+    """Zero with tilt 0.83, radius with length -0.74; a gauge at mid-length would have neither."""
+    *_, zero, length = station_row(make_steps(730, ORDERS)[1])
+    assert zero == pytest.approx(0.83, abs=0.06)
+    assert length == pytest.approx(-0.74, abs=0.08)
 
 
 @pytest.mark.slow
