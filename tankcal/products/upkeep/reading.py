@@ -427,7 +427,8 @@ def _build(sections, stock, meters, files, findings, sources, log, state):
     operation = Operation(
         stock, {name: meter for name, (meter, _) in meters.items()}, priors, air,
         {kind: bool(sections[kind]["net"]) for kind in ("meters", "deliveries")},
-        int(steps.marks.time_ns[0]), _find_offsets(events, files["events"], log),
+        int(steps.marks.time_ns[0]),
+        tuple(sorted({event["time"] for event in events if event["kind"] in NEW_OFFSET})),
     )  # fmt: skip
     traceable = {name: number for name, (_, number) in meters.items() if number}
     for flow in flows:
@@ -485,25 +486,18 @@ def _read_events(files, log):
                     text = message("upkeep_event", "found {kind}; expected a kind of {kinds}",
                                    kind=shown(kind), kinds=", ".join(EVENTS))  # fmt: skip
                     log.problem(file.path.name, text, int(chunk["row"][place]), "kind")
+                if kind == "product_changed":
+                    text = message("upkeep_product_changed", "the product changed: another density "
+                                   "moves the float, so the gauge has a new offset; the expansion "
+                                   "is that of [liquid] throughout. Expected an upkeep for each "
+                                   "product")  # fmt: skip
+                    log.warning(file.path.name, text, int(chunk["row"][place]), "kind")
                 meter = chunk["meter"][place] if "meter" in chunk else None
                 events.append(
                     {"time": int(chunk["time"][place]), "kind": kind,
                      "meter": meter if isinstance(meter, str) else None}
                 )  # fmt: skip
     return sorted(events, key=lambda event: event["time"])
-
-
-def _find_offsets(events, files, log):
-    """Times from which the gauge has a new offset: it was set, or its float is in other liquid."""
-    times = [event["time"] for event in events if event["kind"] in NEW_OFFSET]
-    for event in events:
-        if event["kind"] == "product_changed":
-            text = message("upkeep_product_changed", "the product changed on {day}: another "
-                           "density moves the float, so the gauge has a new offset; the expansion "
-                           "is that of [liquid] throughout. Expected an upkeep for each product",
-                           day=str(np.datetime64(event["time"], "ns"))[:10])  # fmt: skip
-            log.warning(files[0].path.name, text)
-    return tuple(sorted(set(times)))
 
 
 def _read_tickets(files, findings):

@@ -86,7 +86,11 @@ def keep_up(inputs, state=NO_STATE, *, with_steps=False):
         reasons.append("stock_contents")
     if watched.alarm_s is not None:
         reasons.append("alarm")
-    reasons += _find_unknown(estimation, is_free)
+    causes, (_, u) = estimation.balance.causes, estimation.sizes()
+    if any(u[i] > UNKNOWN * causes.sd[i] for i in np.flatnonzero(
+            np.array(causes.names) == "gauge_zero")):  # fmt: skip
+        reasons.append("zero")
+    reasons += ["tilt"] if is_free else []
     mode = "improved"
     if {"few_steps", "small_range", "global_test", "outliers", "alarm"} & set(reasons):
         mode = "watched"
@@ -234,14 +238,6 @@ def _refusals(estimation, table, low, high, former_u, seen, traceable):
     if not traceable:
         reasons.append("no_traceable_meter")
     return reasons
-
-
-def _find_unknown(estimation, is_free):
-    """Codes of undetermined quantities: the zero of the gauge; the tilt beside the zero."""
-    causes, (_, u) = estimation.balance.causes, estimation.sizes()
-    zero = [i for i, name in enumerate(causes.names) if name == "gauge_zero"]
-    codes = ["zero"] if zero and u[zero[0]] > UNKNOWN * causes.sd[zero[0]] else []
-    return codes + (["tilt"] if is_free else [])
 
 
 def _error_ratio(change, former_U, U):
