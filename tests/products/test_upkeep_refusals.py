@@ -240,7 +240,7 @@ def test_changed_product_gives_the_gauge_a_new_offset(capsys, folder):
     assert hold(shown, "declare an event gauge_set", "un evento gauge_set", "um evento gauge_set")
     declare_event(folder, f"{DAY}T00:00:00,product_changed,")
     shown, saved = run(capsys, folder)
-    assert hold(shown, "events.csv, row 2, kind: the product changed", "el producto cambió",
+    assert hold(shown, "events.csv: the product changed", "el producto cambió",
                 "o produto mudou")  # fmt: skip
     assert saved["watch"]["alarm"] is None
     offset = next(cause for cause in saved["causes"] if cause["name"] == f"gauge_offset {DAY}")
