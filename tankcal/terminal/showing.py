@@ -18,18 +18,8 @@ from functools import partial
 from pathlib import Path
 
 from tankcal.errors import InputError, problem_of
-from tankcal.job.folder import MAX_SETTINGS_BYTES, parsed_toml
-from tankcal.job.tables import (
-    SETTINGS_FILE,
-    SETTINGS_SHEET,
-    WORKBOOK_FILE,
-    Log,
-    read_bytes,
-)
 from tankcal.messages import Message, message, printable, printable_lines
-from tankcal.text.delimited import read_json
 from tankcal.text.shipped import DEFAULT, LANGUAGES, nearest_language
-from tankcal.text.words import load_words
 
 
 def read_job_language(path):
@@ -37,6 +27,8 @@ def read_job_language(path):
 
     No problem is reported here; `load` reports the problems of the job.
     """
+    from tankcal.job.tables import SETTINGS_FILE, WORKBOOK_FILE, Log
+
     path, log = Path(path), Log()
     try:
         if (path / WORKBOOK_FILE).is_file() and not (path / SETTINGS_FILE).is_file():
@@ -52,6 +44,7 @@ def read_job_language(path):
 
 def read_plan_language(path):
     """Return the language of a plan for `load_plan`, or None."""
+    from tankcal.job.tables import Log
     from tankcal.planning.contract import PLAN_FILE
 
     path = Path(path)
@@ -64,6 +57,7 @@ def read_plan_language(path):
 def read_record_language(path):
     """Return the language of the job of a record, or of the record in a folder of results."""
     from tankcal.record.versions import RECORD
+    from tankcal.text.delimited import read_json
 
     path = Path(path)
     try:
@@ -75,6 +69,9 @@ def read_record_language(path):
 
 def _read_settings(path, log):
     """Return the language in job.toml or plan.toml."""
+    from tankcal.job.folder import MAX_SETTINGS_BYTES, parsed_toml
+    from tankcal.job.tables import read_bytes
+
     data = read_bytes(path, log, MAX_SETTINGS_BYTES)
     parsed = None if data is None else parsed_toml(path.name, data, log)
     section = {} if parsed is None else parsed[0].get("table")
@@ -85,6 +82,7 @@ def _read_workbook(path, log):
     """Return the language in a job workbook."""
     from tankcal.job.excel import MAX_FILE_BYTES, Unreadable, read_sheets
     from tankcal.job.sheets import KEY, SECTION, VALUE, table_rows
+    from tankcal.job.tables import SETTINGS_SHEET, read_bytes
 
     data = read_bytes(path, log, MAX_FILE_BYTES)
     if data is None:
@@ -107,6 +105,8 @@ def _read_workbook(path, log):
 
 def _language_of_form(cells):
     """Return the language of the explanations of a form."""
+    from tankcal.text.words import load_words
+
     for language in LANGUAGES:
         notes = load_words(language)["input"].get("notes", {})
         if language != DEFAULT and notes["keys"]["table.language"] in cells:
