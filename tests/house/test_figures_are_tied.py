@@ -27,7 +27,6 @@ PAGES = sorted(
 GIVEN = tomllib.loads((ROOT / "tests/house/figures_given.toml").read_text(encoding="utf-8"))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES)
 def test_each_figure_has_a_test(page):
     untied = untied_figures(page, GIVEN.get(page, ()))

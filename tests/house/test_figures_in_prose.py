@@ -167,7 +167,6 @@ def sag_of(weight_n_per_m, span_m, tension_n):
     return weight_n_per_m**2 * span_m**3 / (24 * tension_n**2)
 
 
-@pytest.mark.slow
 def test_chance_of_equal_repeats():
     """Two normal readings, rounded: equal if the difference is in the triangle of one step."""
     sd, *parts = figures_as_numbers(

@@ -88,7 +88,7 @@ def texts():
     return {language: dict(texts_of(load_words(language))) for language in LANGUAGES}
 
 
-@pytest.mark.slow
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("language", OTHERS)
 def test_one_word_for_one_thing(texts, language):
     found = [
@@ -140,7 +140,6 @@ def test_the_glossary_has_its_terms_in_three_languages():
     assert names == sorted(set(names))
 
 
-@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(("language", "column"), [("pt-BR", 1), ("es", 2)])
 def test_words_use_the_terms_of_the_glossary(language, column):
     path = ROOT / f"report_templates/words/{language}.toml"

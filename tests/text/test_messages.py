@@ -87,7 +87,7 @@ def test_each_code_is_made_in_one_place():
     assert [code for code, calls in places.items() if len(calls) > 1] == []
 
 
-@pytest.mark.slow
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("language", OTHERS)
 def test_language_has_every_message_with_its_values(language):
     words, places = load_words(language), made()
