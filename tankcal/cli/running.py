@@ -138,12 +138,6 @@ def _compute(
     if doubts and tell is _tell:  # before the computation, which they may slow down
         show.end()
         print_doubts(doubts)
-    if papers[1]:
-        # Docstrings, which no command shows, take a third of the time to load matplotlib.
-        from matplotlib import artist
-
-        artist.kwdoc = lambda _: ""
-        artist.ArtistInspector.get_setters = lambda _: []
     result = None
     if only == "adjustment":
         adjustment = tankcal.adjust_job(job, show.step)

@@ -14,7 +14,6 @@ import shutil
 import sys
 import time
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 
 from tankcal.errors import InputError, problem_of
@@ -222,36 +221,13 @@ def complain(text):
 
 def read_job(source, show, **options):
     """Return the checked Job of a folder or workbook; set its language."""
-
     language = read_job_language(source)
     if language is not None:
         speak(language)
     show.step(message("reading_job", "reading {file}", file=str(source)))
-    load_scipy_lightly()
     from tankcal.job import load  # takes half a second: print the line above first
 
     return load(source, **options)
-
-
-def load_scipy_lightly():
-    """Load the base of scipy without docstrings and packages of numpy that no command uses.
-
-    These take half of the time to load it: scipy composes docstrings, and copies all names of
-    numpy, which loads the Fortran compiler. Only for a process that shows no docstrings. Without
-    effect if scipy moves its private modules.
-    """
-    import numpy
-
-    directory, names = numpy.__dir__, numpy.__all__
-    unused = {"f2py", "ma", "testing"}
-    with suppress(ImportError):
-        from scipy._lib import _docscrape
-
-        _docscrape.FunctionDoc = partial(_docscrape.FunctionDoc, doc="")
-        numpy.__dir__ = lambda: [name for name in directory() if name not in unused]
-        numpy.__all__ = [name for name in names if name not in unused]
-        import scipy._lib.array_api_compat.numpy  # noqa: F401
-    numpy.__dir__, numpy.__all__ = directory, names
 
 
 def prepare_for_small_work():

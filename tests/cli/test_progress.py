@@ -3,12 +3,9 @@
 import io
 import sys
 
-import numpy as np
 import pytest
-from scipy._lib import _docscrape
-from scipy._lib._array_api import xp_capabilities
 
-from tankcal.terminal.showing import Progress, describe_progress, load_scipy_lightly
+from tankcal.terminal.showing import Progress, describe_progress
 
 
 @pytest.mark.parametrize(
@@ -40,12 +37,3 @@ def test_a_line_is_written_over_and_never_wraps(monkeypatch, columns, lines):
     assert len(rows) == lines
     assert "10.0/10.0 million" in rows[-1]
     assert max(map(len, rows)) < int(columns) + len("\x1b[K")
-
-
-def test_scipy_without_docstrings_works(monkeypatch):
-    monkeypatch.setattr(_docscrape, "FunctionDoc", _docscrape.FunctionDoc)
-    load_scipy_lightly()
-    assert {"ma", "testing", "f2py"} <= {*dir(np), *np.__all__}  # as before
-    documented = xp_capabilities(capabilities_table={})(lambda x: x)
-    assert documented(2) == 2
-    assert "Array API" in documented.__doc__  # scipy composed it, of an empty docstring
