@@ -39,10 +39,21 @@ from tankcal.survey.results import Cause
 from tankcal.survey.sighting import Poses
 from tankcal.units import FULL_TURN
 
-MOST_TANGENTS = 2500  # largest number that was verified
+MOST_TANGENTS = 25_000  # largest number that was verified, see docs/studies/sizes.md
+MOST_LEVELS = 300  # each level has a centre, from at least five of the 1600 sites of the wall
 FEWEST_SETUPS = 3  # smallest number of set-ups of a level, with two sights each
 LEAST_RISE = 0.05  # smallest sine of the zenith angle: a steeper sight touches no wall
 ROUNDS, FAR_SDS = 30, 2.0  # of the robust circle; residuals, in sds, from which weights fall
+
+
+def too_many_levels(count):
+    """Message about more levels than the wall can have centres."""
+    return message(
+        "too_many_levels",
+        "{count} levels; expected at most {most}: sight more limbs at fewer levels",
+        count=count,
+        most=MOST_LEVELS,
+    )
 
 
 def too_many_tangents(count):

@@ -22,11 +22,13 @@ from job_builder import tangent_parts, write_book, write_folder
 from page_figures import figures_of
 
 import tankcal
+from tankcal.covariance import PointCovariance
 from tankcal.errors import InputError, SolutionError
 from tankcal.geometry.field.sites import free_design
 from tankcal.methods.moved_setups import critical_of_setup, judge_tangents
 from tankcal.pipeline.wall.shared_unknowns import noise_of_wall
 from tankcal.survey.poses import poses_in_network
+from tankcal.survey.tangents import touch
 
 FOOT, SLOPE, HEIGHT, PLATE = (0.3, -0.2), (0.002, -0.001), 8.0, 0.008
 LEVELS = (0.4, 1.6, 2.4, 3.6, 4.4, 5.6, 6.4, 7.6)
@@ -122,6 +124,27 @@ def test_noise_is_within_U(noisy):
     assert abs(noisy.table.volume_m3[-1] - inside_of(oval)) < noisy.table.U_m3[-1]
     budget = {one.name for one in noisy.budget().lines}
     assert {"instrument_scale", "tangent_excess", "points"} <= budget
+
+
+@pytest.mark.slow
+def test_blocks_and_shared_columns_equal_a_dense_matrix(tmp_path, noisy, monkeypatch):
+    """Second method: the table from the dense covariance of the tangents."""
+
+    def touch_dense(*arguments, **options):
+        touching = touch(*arguments, **options)
+        dense = PointCovariance.convert(touching.points.covariance_m2.dense(), 3)
+        return replace(touching, points=replace(touching.points, covariance_m2=dense))
+
+    monkeypatch.setattr("tankcal.methods.tangents.wall.touch", touch_dense)
+    table = run(tmp_path, parts_of()).table
+    np.testing.assert_allclose(noisy.table.volume_m3, table.volume_m3, rtol=1e-12)
+    np.testing.assert_allclose(noisy.table.U_m3, table.U_m3, rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_too_many_levels_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("tankcal.methods.tangents.readings.MOST_LEVELS", len(LEVELS) - 1)
+    assert problems_of(tmp_path, parts_of()) == [("tangents.csv", None, None)]
 
 
 def test_the_field_knows_of_limbs(noisy):

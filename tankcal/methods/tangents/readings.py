@@ -14,7 +14,14 @@ from tankcal.job.checks.tapes import check_levels, refuse_others
 from tankcal.job.measuring import setups_of
 from tankcal.job.structure import angle_in_rad
 from tankcal.messages import message
-from tankcal.survey.tangents import FEWEST_SETUPS, MOST_TANGENTS, Tangents, too_many_tangents
+from tankcal.survey.tangents import (
+    FEWEST_SETUPS,
+    MOST_LEVELS,
+    MOST_TANGENTS,
+    Tangents,
+    too_many_levels,
+    too_many_tangents,
+)
 from tankcal.units import ARCSEC
 
 
@@ -24,6 +31,9 @@ def check_tangents(values, tables, registers, raw, log):
     if len(table.rows) > MOST_TANGENTS:
         log.problem(table.file, too_many_tangents(len(table.rows)))
         return
+    levels = len(set(zip(table.of("course"), table.of("level_m"), strict=True)))
+    if levels > MOST_LEVELS:
+        log.problem(table.file, too_many_levels(levels))
     for name in ("points", "targets", "wall_hits"):
         if has_rows(tables[name]):
             expected = message(

@@ -181,12 +181,14 @@ def _hull_of(job, touching, wall):
     )
     excess_m, slope_m = np.zeros(len(heights)), np.zeros(len(heights))
     place, levels = job.tangents.levels
+    height = np.array([np.median(heights[place == number]) for number in range(len(levels))])
+    course = course_of(height, joints)
+    low, high = joints[course], joints[course + 1]
+    # A single call for all levels: the outlines of all courses are computed at each height.
+    outlines = field.outlines_at(2 * (height - low) / (high - low) - 1)
     for number in range(len(levels)):
         is_of_level = place == number
-        height = np.median(heights[is_of_level])
-        course = int(course_of(height, joints))
-        low, high = joints[course : course + 2]
-        outline = field.outlines_at([2 * (height - low) / (high - low) - 1])[course, 0]
+        outline = outlines[course[number], number]
         # Radii at equally spaced azimuths without their first harmonic, about their own centre.
         waves = np.fft.rfft(outline)
         waves[1] = 0.0
