@@ -390,7 +390,12 @@ BAD = {
     "no strap": (LINES, "[[straps]]", "[[hits]]", None),
     "key": (LINES, "faces = 2", "face = 2", ("plan.toml", "lines.face")),
     "half": (LINES, "count = 12", "count = 12.5", ("plan.toml", "lines.count")),
-    "many": (HITS, "hits = 20 ", "hits = 400 ", ("plan.toml", "hits")),
+    "many": (
+        HITS,
+        "hits = 20                          # at each height\nat_percent = [20, 80]",
+        "hits = 400\nat_percent = [5, 10, 15, 20, 25, 30, 35, 40, 45, 50, 55, 60, 65, 70, 75, 80]",
+        ("plan.toml", "hits"),
+    ),
     "on the wall": (HITS, "radius_m = 1.5 ", "radius_m = 7.0 ", ("plan.toml", "hits[1].radius_m")),
     "no traverse": (
         TANGENTS,
