@@ -24,8 +24,6 @@ times the profile in the radial direction, and once the profile in the tangentia
 
 Source: Brown 1971.
 
-Sets of interior parameters of an adjustment or of a record.
-
 Photos with common parameters belong to one set.
 """
 

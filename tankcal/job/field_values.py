@@ -6,8 +6,6 @@ A number such as 12,5 or 0.125 has one meaning. The numbers 1,234 and 1.234 have
 mark may be a decimal mark or separate thousands. The bounds of the column, the other numbers of the
 file, or [csv] in the settings decide: a dip of up to 200 m is not 1234 m.
 
-Conversion of cells and keys to values, by the kind of their field.
-
 `read_value` converts the content of a file to a Python value, or raises `Refused` with the value
 found and the value expected. `tankcal.job.fields` describes the fields.
 The message of a refusal contains a hint if a spreadsheet stores a value as another type than

@@ -1,7 +1,5 @@
 """Description of one value of a job: a number with bounds, a name, a date, a choice.
 
-Description of one value of a job: a number with bounds, a name, a date, a choice.
-
 A `Field` describes one key of job.toml or one column of a table, and states in words which values
 it accepts. `tankcal.job.field_values` reads the values and raises `Refused` for invalid ones.
 

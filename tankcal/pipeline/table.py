@@ -1,7 +1,5 @@
 """From the survey to the capacity table, and the statements that accompany its rows.
 
-From the survey to the capacity table: rows, volumes and their causes of uncertainty.
-
 The wall may be that of an adjusted survey or of a plan.
 """
 

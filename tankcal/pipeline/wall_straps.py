@@ -1,7 +1,5 @@
 """Straps and offsets of a wall, with points or alone, as readings of one field.
 
-Straps and offsets of a wall with points: readings of one field, each tested by the others.
-
 A circumference is the mean radius of its level, except for the area term. The size of the area term
 follows from the ovality and the seams that the points show. Inside points see the shell without
 plate and paint, whereas a tape outside includes them.

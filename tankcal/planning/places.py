@@ -1,7 +1,5 @@
 """Geometry of a plan: positions relative to the wall, and visibility of points.
 
-Geometry of a plan: positions relative to the wall, joints, rows of targets, plates, bases.
-
 A base is a distance from angles to a stadia over one station, read from another.
 
 Visibility of points: inside the frame, incidence within the limit, line of sight free.

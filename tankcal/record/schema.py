@@ -1,7 +1,5 @@
 """Saved data, declared once as dataclasses: JSON schema, conversion to plain data, texts.
 
-Saved data, declared once as dataclasses: JSON schema, conversion to plain data, and reading.
-
 A dataclass is a JSON object. Its fields are the keys, in their order, with the unit in the name. A
 float may be null, since NaN and infinity are written as null; other values are null only if their
 type includes None. A Message `x` is written as `x`, and as `x_code` and `x_values` at the end of

@@ -1,7 +1,5 @@
 """Measurements of a survey as read, in SI, and horizontal distances by stadia.
 
-Measurements of a survey as read: checked tables in SI units.
-
 Image coordinates and cameras stay in millimetres; angles are in radians. Rows keep the order of
 their files, and repeated readings stay separate. Values are neither averaged, corrected nor
 omitted. Names are texts; an absent table is None or ().

@@ -1,7 +1,5 @@
 """Tanks that are a single solid: lying cylinder with its ends, sphere, upright ellipsoid.
 
-Tanks that are a single solid: the lying cylinder with its ends, and the sphere.
-
 Both are parts of a capacity table, with volumes, free surfaces and derivatives at any dips. Dips
 count from the inside bottom, in metres; dips outside the tank raise HeightError.
 

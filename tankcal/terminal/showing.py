@@ -1,7 +1,5 @@
 """Terminal output in the language of the job: progress, remaining time, warnings, lists of files.
 
-Terminal output in the language of the job: progress, warnings, lists of files; JSON output.
-
 With `--json` a command prints one JSON object on standard output, for other programs.
 """
 

@@ -765,7 +765,7 @@ LIMITS += [
         "docs/studies/clouds-wall.md",
         "meet the foot of the shell within () m (or () % of the radius) and appear in () % of the",
         [
-            cloud_bottom.BOTTOM_FOOT_M,
+            cloud_bottom.FOOT_OFF_M,
             PERCENT * cloud_bottom.FOOT_SHARE,
             PERCENT * cloud_bottom.LEAST_SHARE,
         ],

@@ -34,8 +34,6 @@ A dropped parameter is held at zero. The parameters k that are kept then have
 
 The prediction is exact for a linear model with unchanged sigma0. Source: Koch 1999, section 3.2.7.
 
-Analysis of one set of interior parameters, and its update by new adjustments.
-
 Tests, components, predictions and rules follow from the covariance of the set. Trials add the
 effect of dropping parameters on points and volume, which updates the recommendation.
 """

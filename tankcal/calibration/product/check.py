@@ -20,8 +20,6 @@ A table is a TOML file:
 
 The classes are listed from the best to the worst.
 
-Bias, precision and accuracy classes of a product from differences at check points.
-
 For n differences d with mean m and standard deviation s along one axis:
 
     bias        t = m / s sqrt(n)                  against t(n-1, alpha/2), two-sided

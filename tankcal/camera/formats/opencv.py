@@ -696,7 +696,7 @@ def _parse_camera(words, row, notes):
     return Colmap(model, size, params)
 
 
-def format_text_colmap(cameras):
+def format_colmap(cameras):
     """Text of a cameras.txt for [(name, Colmap)]; names that are no numbers become numbers."""
     # Cameras are numbered unless every name is a number.
     are_numbers = all(name.isdecimal() and name.isascii() for name, _ in cameras)

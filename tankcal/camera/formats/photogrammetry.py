@@ -1,7 +1,5 @@
 """Cameras of Agisoft Metashape and of Pix4D.
 
-Cameras of Agisoft Metashape: frame camera, and its calibration as XML.
-
 With x, y the ray to the right and down, r2 = x2 + y2:
 
     x' = x (1 + K1 r2 + K2 r4 + K3 r6 + K4 r8) + (P1 (r2 + 2 x2) + 2 P2 x y) (1 + P3 r2 + P4 r4)
@@ -408,7 +406,7 @@ def frame_fits_sensor(camera, size_px):
     return abs(width * size_px[1] / (height * size_px[0]) - 1) <= SAME_SHAPE
 
 
-def format_text_pix4d(cameras):
+def format_pix4d(cameras):
     """Text of a .cam file for [(name, Pix4D)]."""
     lines = []
     for name, camera in cameras:

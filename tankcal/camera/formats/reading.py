@@ -1,7 +1,5 @@
 """Interface to camera files of other programs: reading, writing, and cameras.toml.
 
-Interface to camera files of other programs; the program is recognised from the content.
-
 kind       file
 opencv     YAML and XML of FileStorage, JSON with K and dist; opencv-json has the same meaning
 colmap     cameras.txt
@@ -10,8 +8,6 @@ pix4d      PROJECT_pix4d_calibrated_internal_camera_parameters.cam
 aicon      lines of the balanced form, such as Ck -24.1
 
 The files of OpenCV, COLMAP and Metashape do not contain the size of a pixel.
-
-Cameras as text of a file of another program, or of cameras.toml.
 
 Terms that a form does not contain are approximated by a fit over the frame. The error is returned
 with the text.
@@ -624,9 +620,9 @@ def _write_in_pixels(kind, cameras):
     elif kind == "metashape":
         text = photogrammetry.format_text(first)
     elif kind == "colmap":
-        text = opencv.format_text_colmap(converted)
+        text = opencv.format_colmap(converted)
     else:
-        text = photogrammetry.format_text_pix4d(converted)
+        text = photogrammetry.format_pix4d(converted)
     return CameraText(text, tuple(camera.error_px for _, camera in converted))
 
 

@@ -6,8 +6,6 @@ Near the bottom each cell has a histogram of heights, and integer sums of height
 to the top of the shell each cell has counts at levels, which show objects in the tank. Counts of
 each scan in coarse classes give the share of each scan. Counts above the shell show a roof.
 
-Bottom of an upright tank in scans from inside.
-
 Heights are counted in cells of the plan. Heights that connect from cell to cell form a surface. The
 largest surface is the bottom, and it must meet the foot of the shell. A film of liquid gives mirror
 images; each lies as far below the bottom as its object lies above. Objects on the bottom are
@@ -310,7 +308,7 @@ def sum_floor_cells(points, grid, from_inside):
 LEAST_SHARE = 0.4  # least share of the plan that must show the bottom
 # Width of the ring at the shell where the bottom is compared with the foot of the shell, cells;
 # largest distance between them, m, and as a share of the radius
-EDGE_CELLS, BOTTOM_FOOT_M, FOOT_SHARE = 3, 0.25, 0.01
+EDGE_CELLS, FOOT_OFF_M, FOOT_SHARE = 3, 0.25, 0.01
 LEAST_SD_M = 1e-4  # least standard deviation of the height of a cell, m
 CLEAR_BINS = 5  # bins about the bottom that belong to it; lower points belong to another object
 LEAST_PIT_CELLS, LEAST_PIT_M = 2, 0.05  # least number of cells and least depth of a pit
@@ -538,7 +536,7 @@ def _check_bottom(z, is_bottom, rim, seen, grid):
         )
         raise InputError(Problem(FILE, text))
     off = float(np.median(foot)) - grid.bottom_m
-    if abs(off) > max(BOTTOM_FOOT_M, FOOT_SHARE * grid.surface.radius_m):
+    if abs(off) > max(FOOT_OFF_M, FOOT_SHARE * grid.surface.radius_m):
         text = message(
             "cloud_bottom_elsewhere",
             "the largest surface that lies in the shell is at {found_m:.3f} m beside the wall, "

@@ -1,7 +1,5 @@
 """Amplitudes of the components of a wall and the noise of its sections, from measurements.
 
-Amplitudes of the components of a wall, estimated from measurements.
-
 The logarithms of the variances have a normal prior (`components`). The estimated amplitudes
 maximise the posterior density given the readings (`likelihood`); the curvature at the maximum gives
 their covariance.

@@ -1,7 +1,5 @@
 """Wall of a tank as a random field: best estimate from measurements, and values at places.
 
-Wall of a tank as a random field: best estimate from measurements, and its uncertainty.
-
 With the components of `components` and their amplitudes, the wall is a Gaussian field with a free
 radius in each course and a free centre of each ring. The measurements y = X beta + f + noise give
 the best linear unbiased estimate of every linear functional of the wall, g = X_g beta + f_g,

@@ -2,8 +2,6 @@
 
 `simulate` draws, and `verdict` validates the GUM intervals. Capacity tables are `QuadraticRows`.
 
-Monte Carlo simulation of a model with many rows, adaptive to a numerical tolerance.
-
 The linear part L of the model is the control variate of each batch of draws. L has known quantiles
 L_p. The error of the draws for L corrects the quantiles of the output: V_p is the sample quantile
 at p + beta (F_L,sample(L_p) - p). Likewise u^2 = s_V^2 - b (s_L^2 - u_L^2). Regression within the

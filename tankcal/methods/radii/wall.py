@@ -9,8 +9,6 @@ Each radius is that of the circle of the mean area of a course, inside, shell em
 reference temperature. The volume up to a joint therefore depends on the radii alone. Between joints
 the uncertainty includes the possible form of a course (`geometry.field.estimate`).
 
-Best linear unbiased update of former radii by a survey of some courses.
-
 The new and the former radius of a course are compared under one definition: radius of the mean area
 from joint to joint, inside, shell empty, at the temperature of the former radii. The survey gives
 this radius from a tank of its own, with all its causes of uncertainty.

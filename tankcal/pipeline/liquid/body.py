@@ -1,7 +1,5 @@
 """Body of a tank under the calibrating liquid, and determined together with the liquid.
 
-Body of a tank under the calibrating liquid, at the dips of the runs.
-
 Some inputs of horizontal tanks and spheres have a nonlinear effect on volumes: sizes, tilt and the
 zero of the table. They are moved to their estimates by liquid, step by step (Gauss-Newton). All
 other inputs have an almost linear effect and keep their values.

@@ -4,8 +4,6 @@ Users of an app that other machines can reach: names, roles, passwords, sessions
 
 users.toml has a table for each user, with roles and the hash of the password (scrypt, RFC 7914).
 
-Access to the app: names of the host, origin, token and policies of the pages.
-
 A web page of another site must not reach the app, and neither must other users of the machine:
 
 - Host is a name of this server (a foreign name may point to 127.0.0.1, DNS rebinding);

@@ -1,7 +1,5 @@
 """Requirements of an assessment, their sources, the findings, and their saved form.
 
-Requirements of an assessment, their sources, and the findings.
-
 The basis of a requirement states how its text is known: "read" in the text itself; "summary" from a
 public guidance page on the clause; "memory", never compared with the text; "internal", a rule of
 tankcal. Only a clause that was read is evidence of itself (docs/assess.md).

@@ -1,7 +1,5 @@
 """Editing of a job: its files on the disk and in their edited state, with its problems by cell.
 
-Editing of a job: its files on the disk and in their edited state.
-
 draft = Draft.open("my-tank")
 draft.set_cells("points", [(0, "x_m", "6.5021")])
 draft.check().problems

@@ -1,7 +1,5 @@
 """Gaps between the wall and boards laid over welds.
 
-Gaps between the wall and boards laid over welds, for each scan and combined from all scans.
-
 e(s) is the deviation of the wall from a circle along the arc, or from a straight line up the wall.
 It is positive outwards; s is the distance from the weld. A board of length b touches the wall with
 both ends, and the gap is

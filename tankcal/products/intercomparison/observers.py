@@ -9,8 +9,6 @@ Simulated strapping of every course, or of the first course with optical referen
 
 The tape follows the convex hull of the outside.
 
-Simulated surveys of a tank by each method, as the files of a job.
-
     parts = METHODS["tape"](tank, Chance(rng), asked)
 
 Each method takes the true `Tank`, the source of random errors (`Chance`) and the requested

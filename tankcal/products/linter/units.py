@@ -8,8 +8,6 @@ or with an unknown unit, must not: `unit_of` then returns a complaint instead of
 Exact sizes: 1 in = 0.0254 m, 1 US gallon = 231 in3, 1 barrel = 42 US gallons, 1 imperial gallon =
 4.54609 L.
 
-Identify columns of heights and volumes, and their units, from their headings.
-
 Headings may be in English, Portuguese or Spanish. The unit is part of the heading, in brackets or
 as a word, or stands in a row of units below it.
 """

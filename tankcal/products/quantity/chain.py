@@ -1,7 +1,5 @@
 """From a dip to quantities by API MPMS 12.1.1, and quantities of a transfer.
 
-From a dip to quantities: the chain of API MPMS 12.1.1, step by step.
-
     TOV  total observed volume, from the table at the dip
     FW   free water, from the table at the dip of the water
     GOV  gross observed volume  = (TOV - FW) CTSh + FRA

@@ -1,7 +1,5 @@
 """Comparison of two tables of a tank, and the verdict: keep, recompute or recalibrate.
 
-Verdict of a comparison by a rule and by agreement: keep, recompute or recalibrate.
-
 recalibrate  a value exceeds the limit of the rule, |E_n| exceeds 1, or the former table is older
              than the rule allows. Also if all volumes differ by an undeclared zero larger than the
              limit of the rule for the reference height.

@@ -1,7 +1,5 @@
 """History of the tables of one tank: its input, and its changes on one basis.
 
-History of the tables of one tank: volumes and radii on one basis, and changes between tables.
-
 Every table is compared with the newest one (`recalibration.comparison.compare`), which brings it
 to the newest basis. Each table is also compared with the one before it, which shows the changes
 between them. All results are results of these comparisons.

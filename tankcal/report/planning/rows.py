@@ -1,7 +1,5 @@
 """Tables of the field sheets of a plan: rows and columns, for paper, CSV files and workbook.
 
-Tables of the field sheets of a plan of targets: rows and columns, for paper and workbook.
-
 Lengths are in metres, angles in radians. A text that is a code is looked up in the words.
 """
 

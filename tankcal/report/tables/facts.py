@@ -1,7 +1,5 @@
 """Facts of a tank and its survey, and the dip point, for certificate, field sheet and sketch.
 
-Facts of a tank and its survey, as names and values, for certificate, field table and workbook.
-
 Each set of facts is a `Table` with a single row. `Column.key` is the label of the fact; `on` and
 `sheet` select the papers that show it. `plain.PlainPaper.facts_of` and the sheet Certificate write
 the facts.

@@ -1,7 +1,5 @@
 """Stated uncertainty: uncertain inputs, rows of the table, volumes and deliveries.
 
-Stated uncertainty of the rows of the table, of single volumes, and of deliveries.
-
 If Monte Carlo does not validate the GUM interval, the Monte Carlo interval is stated. U is then the
 larger distance of its ends from the volume (docs/studies/propagation.md).
 """

@@ -5,8 +5,6 @@ Conversion of each kind of block to HTML; all texts are escaped.
 Long tables are divided and have a search field. SVG images contain their fonts, since other fonts
 would change the width of labels.
 
-Conversion of blocks to HTML, for Jupyter and for a web page: a single file without network.
-
 A content security policy restricts the browser to scripts and styles with given SHA-256 digests.
 Texts of users can therefore never run as scripts.
 """

@@ -158,7 +158,7 @@ FACTORS = (
     (10.0, MISPLACED),
     (0.1, MISPLACED),
 )
-DIAGNOSE_CLOSE = 0.003  # relative accuracy with which a factor must explain a distance
+FACTOR_TOLERANCE = 0.003  # relative accuracy with which a factor must explain a distance
 # largest remaining share of the plan distance between given and adjusted after a swap
 SWAPPED = 0.05
 GON = (
@@ -319,7 +319,7 @@ def wrong_distances(doubtful):
         if reading.kind != "distance" or not computed > 0:
             continue
         for factor, what in FACTORS:
-            if abs(reading.value / computed / factor - 1) < DIAGNOSE_CLOSE:
+            if abs(reading.value / computed / factor - 1) < FACTOR_TOLERANCE:
                 text = message(
                     "wrong_distance",
                     "distance {distance} is {value_m:.4f} m where {computed_m:.4f} m was expected:"

@@ -5,8 +5,6 @@ Test of held quantities: adjust again with control or one scale released.
 No result is changed. A warning is given if the survey then fits and the released quantity differs
 significantly from its held value.
 
-Trial adjustments of a survey that does not fit, as if a whole file had been misread.
-
 Each trial changes the measurements as one common mistake would, and adjusts without data snooping.
 The mistake that reduces sigma0 most is reported; no result is changed.
 """
@@ -417,7 +415,7 @@ def _free_scales(measurements):
 
 
 BETTER = 0.2  # largest remaining share of sigma0 under a valid explanation
-MISREAD_FILE_SOUND = 5.0  # sigma0 of a survey that fits moderately; a single blunder causes more
+SOUND_SIGMA0 = 5.0  # sigma0 of a survey that fits moderately; a single blunder causes more
 CERTAIN = 2.0  # sigma0 below which no other mistake is tried
 OTHER_UNITS = (
     (FOOT_M, message("feet", "feet")),
@@ -427,7 +425,7 @@ HORIZONTAL = ("directions", "horizontal_angles", "azimuths")
 EXCHANGED = 7  # control points up to which all pairs are exchanged
 CONTROL = "control.csv"
 MOST_SETUPS = 30  # set-ups whose circles are tried in another unit
-MISREAD_FILE_MOST = 12  # photos left out one at a time
+MOST_PHOTOS_OMITTED = 12  # photos left out one at a time
 MOST_FAILURES = 20  # trials without a solution; more would only add to the waiting time
 ALIKE_FAILURES = 6  # trials that fail like the survey itself: readings are then missing
 
@@ -449,7 +447,7 @@ def likely_mistake(measurements, sigma0, run, failure=None):
     -------
     list of Problem
     """
-    limit = min(BETTER * sigma0, MISREAD_FILE_SOUND)
+    limit = min(BETTER * sigma0, SOUND_SIGMA0)
     explained, failures, alike = [], 0, 0
     mistakes = (_mirror_mistakes, _files_in_other_unit, _name_exchanges, _setup_in_other_unit)
     for suppositions in mistakes:
@@ -664,7 +662,7 @@ def photos_that_do_not_fit(measurements, message, run):
     """
     images = measurements.image_points
     failed = [item.name for item in measurements.photos if f"photo {item.name} " in message][
-        :MISREAD_FILE_MOST
+        :MOST_PHOTOS_OMITTED
     ]
     if images is None or not failed or len(failed) == len(measurements.photos):
         return []

@@ -1,7 +1,5 @@
 """Observations of coordinates, heights, plumb lines, distances, angles and directions.
 
-Control coordinates, height differences, plumb lines, vectors, and weighted unknowns.
-
 Correlated observations, which enter the adjustment as a single observation.
 
 Values l with covariance Q = L L' are whitened together: L^-1 (computed - observed) has covariance

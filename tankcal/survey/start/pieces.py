@@ -1,7 +1,5 @@
 """Pieces of a survey in one frame each, their growth and connection.
 
-Pieces of a survey, each with points and photos in one frame, and their connection.
-
     X_onto = scale R X + shift
 
 Three points, or one photo and a further place, determine the transformation. Many triples are

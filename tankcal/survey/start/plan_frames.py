@@ -5,8 +5,6 @@ Positions from distances only: shortest paths complete the distance matrix, scal
 Classical scaling of the matrix of shortest paths gives a start for damped Gauss-Newton on the
 measured distances. Source: Torgerson 1952; Shang et al. 2003 (MDS-MAP).
 
-Local frames in plan without known points, and their connection to known positions.
-
 A traverse between two known points has no known direction; a network without control has no known
 point. Each starts with a station at the origin and its first direction towards +y and grows. It is
 then rotated and shifted onto the known positions, and scaled if it contains no measured length.

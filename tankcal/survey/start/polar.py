@@ -5,8 +5,6 @@ Observations in plan: directions by circle, horizontal lengths, slopes.
 Azimuths form a circle whose zero is north. Horizontal angles with common sights at a station form
 one circle with the first sight as its zero.
 
-Growth of positions in plan: polar points, intersections, arcs, free stations, traverses.
-
 A point lies where two lines, a line and an arc, or two arcs from known points intersect. The
 intersection with the smallest sum of misfits to all observations of the point is used. A point with
 two equivalent positions waits. Controlled points come before uncontrolled ones.

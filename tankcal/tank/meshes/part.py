@@ -1,7 +1,5 @@
 """Closed mesh of triangles as a part of a tank with exact volumes, and its checks.
 
-Closed mesh of triangles as a part of a tank, with exact volumes.
-
 With a_T the plan area of triangle T (positive if its outside faces up), the divergence theorem
 gives the volume of the body below the height h as a sum over its triangles,
 

@@ -524,7 +524,7 @@ def glass_correction(temperature_c, scale):
 WATER_60F = 999.016  # kg/m3, of the relative density 60/60
 BASE_C, BASE_K = (60.0 - 32.0) / 1.8, 519.67 / 1.8
 LEAST_DENSITY, MOST_DENSITY = 0.35, 0.688  # relative density 60/60
-GASE_LOWEST_F, GASE_HIGHEST_F = -50.8, 199.4
+LOWEST_F_OF_GASES, HIGHEST_F_OF_GASES = -50.8, 199.4
 
 # Relative density 60/60, critical temperature K, compressibility at the critical point, critical
 # density mol/L, and k1 to k4 of the saturation density.
@@ -619,14 +619,14 @@ class LiquefiedGas:
         return density_at(temperature_c + 273.15) / density_at(BASE_K)
 
     def _refuse_outside(self, density, temperature_c, pressure_kpa):
-        low, high = ((limit - 32) / 1.8 for limit in (GASE_LOWEST_F, GASE_HIGHEST_F))
+        low, high = ((limit - 32) / 1.8 for limit in (LOWEST_F_OF_GASES, HIGHEST_F_OF_GASES))
         critical = np.interp(np.real(density) / WATER_60F, _FLUIDS[:, 0], _FLUIDS[:, 1]) - 273.15
         high = np.minimum(high, critical)
         least, most = LEAST_DENSITY * WATER_60F, MOST_DENSITY * WATER_60F
         refuse_outside("density_kg_m3", density, least, most, "kg/m3", self.name,
                        (LEAST_DENSITY, MOST_DENSITY, RELATIVE))  # fmt: skip
         refuse_outside("temperature_c", temperature_c, low, high, "degC", self.name,
-                       (GASE_LOWEST_F, 1.8 * high + 32, FAHRENHEIT))  # fmt: skip
+                       (LOWEST_F_OF_GASES, 1.8 * high + 32, FAHRENHEIT))  # fmt: skip
         refuse_outside("pressure_kpa", pressure_kpa, 0.0, 0.0, "kPa", self.name)
 
 

@@ -10,13 +10,9 @@ Answers of the calculators: volume of a dip, dip of a volume, volume between two
 Volumes, U and k agree with the certificate and the page. Between two rows, the larger U of the rows
 applies. A simulated delivery has the U of its simulation.
 
-Widgets of a result: table and calculators, quantity, wall with rejected points, budget.
-
 Quantity calculator of a result: a ticket that is typed, and its quantities with U.
 
 The panel collects the entries; the quantities and all problems are those of `result.ticket`.
-
-Views of a result in a notebook: table, calculators, wall with rejected points, budget.
 
 results_view(result)                      in the language of the job
 results_view(result, on_overrule=decide)  with buttons that call decide(point, decision, reason)

@@ -7,8 +7,6 @@ Student's t follows exactly from the beta distribution, since t^2 / (v + t^2) is
 Above, Fisher's expansion is used up to the fourth power of 1/v. Source: Abramowitz and Stegun,
 Handbook of Mathematical Functions, 26.5.27 and 26.7.5.
 
-A delivery between two dips with its U, in which common errors of both dips cancel.
-
 u^2 is the sum of squares of f(high) - f(low). f is a row of the covariance factor, interpolated
 linearly between rows. k follows from the Welch-Satterthwaite formula over the sources
 (tankcal.tank.deliveries).

@@ -17,8 +17,6 @@ rho is the density at 15 °C. Source: ASTM D1250-80, API Standard 2540, IP 200, 
 oil) and 54B (products). docs/workbook.md lists the printed values of the comparison. The tables
 round intermediate results, this module does not; four printed decimals agree.
 
-Sentences of the calculator on its input, with numbers.
-
 The first sentences concern valid input; all others begin with the word for "refused".
 """
 

@@ -30,7 +30,6 @@ from tankcal.report.workbook.calculator.table import is_no_number
 from tankcal.tank.fittings import AIR_KG_M3, WEIGHTS_KG_M3
 from tankcal.tank.gauging import LIMITS
 from tankcal.tank.volume_correction import petroleum
-from tankcal.tank.volume_correction import petroleum as brazil
 from tankcal.tank.volume_correction.corrections import LEAST_C, MOST_C
 from tankcal.text.digits import NOTHING
 
@@ -60,10 +59,10 @@ def constants():
 
 def classes():
     """Rows (highest density g/cm3, p1, p2, p3, p4) of the classes of CNP 6/70."""
-    bounds = [float(bound) for bound in brazil.CLASSES[:, 0]]
-    bounds[-1] = brazil.MOST
+    bounds = [float(bound) for bound in petroleum.CLASSES[:, 0]]
+    bounds[-1] = petroleum.MOST
     # The highest density of a class belongs to it.
-    return [(bound, *map(float, brazil.coefficients_of_class(bound))) for bound in bounds]
+    return [(bound, *map(float, petroleum.coefficients_of_class(bound))) for bound in bounds]
 
 
 def codes():
@@ -143,7 +142,7 @@ def _form_rows():
     first = "([form]-1)*6+CHOOSE([group_code],1,2,6,1)"
     is_cnp = f"OR({kind}={CNP},{kind}={CNP_UNROUNDED})"
     has_base = f"OR({kind}<={D1250_80},{kind}={COEFFICIENT})"
-    base_c = f"IF({has_base},CHOOSE({base},{bases}),{brazil.BRAZIL_BASE_C!r})"
+    base_c = f"IF({has_base},CHOOSE({base},{bases}),{petroleum.BRAZIL_BASE_C!r})"
     glass_cnp = f"IF([hydrometer_code]=0,1,[glass]/{_glass('[t_s]', '20C')})"
     return [
         cell_row("is_d1250", "", f"IF(AND([valid]=#fine,{kind}<=2),1,0)", 0),
@@ -286,7 +285,7 @@ def _brazil_density():
 
 def class_formula(density):
     """Formula of the class of a density: the number of lower bounds, and 1."""
-    return f"MIN({len(brazil.CLASSES)},1+SUMPRODUCT((quantity_classes<{density})*1))"
+    return f"MIN({len(petroleum.CLASSES)},1+SUMPRODUCT((quantity_classes<{density})*1))"
 
 
 def _base_density(number):
@@ -318,16 +317,16 @@ def _base_density(number):
          f"IF([rho_b]<{middle!r},{petroleum.HIGHEST_F[1] - petroleum.HIGHEST_F[2]!r},0)",
          f"IF([rho_b]<{light!r},{petroleum.HIGHEST_F[0] - petroleum.HIGHEST_F[1]!r},0)"]
     )  # fmt: skip
-    lowest = (low_c, (petroleum.LOWEST_F - 32) / 1.8, *2 * (brazil.LOWEST_C,), *2 * (LEAST_C,))
+    lowest = (low_c, (petroleum.LOWEST_F - 32) / 1.8, *2 * (petroleum.LOWEST_C,), *2 * (LEAST_C,))
     cold = ",".join(map(repr, lowest))
-    highest = (brazil.HIGHEST_C, brazil.HIGHEST_C, MOST_C, MOST_C)
+    highest = (petroleum.HIGHEST_C, petroleum.HIGHEST_C, MOST_C, MOST_C)
     hot = f"{high_c!r},({high_f}-32)/1.8,{','.join(map(repr, highest))}"
-    cnp_low, cnp_high = 1000 * brazil.LEAST, 1000 * brazil.MOST
+    cnp_low, cnp_high = 1000 * petroleum.LEAST, 1000 * petroleum.MOST
     is_group = f"AND({kind}<=2,[group_code]<4)"
     least = f"IF({is_group},INDEX(quantity_low,[first]),IF([is_cnp]=1,{cnp_low!r},0))"
     heaviest = "[first]+IF([group_code]=2,3,0)"
     most = f"IF({is_group},INDEX(quantity_high,{heaviest}),IF([is_cnp]=1,{cnp_high!r},1E+9))"
-    light_cnp, heavy_cnp = brazil.THREE_DECIMALS_TO, brazil.FOUR_DECIMALS_FROM
+    light_cnp, heavy_cnp = petroleum.THREE_DECIMALS_TO, petroleum.FOUR_DECIMALS_FROM
     good = "[valid]=#fine"
     cases = [
         ("ISERROR([rho_b])", "no_base_density"),
@@ -366,7 +365,7 @@ def factor_rows():
     r1, r2, r3, r4 = rounded
     fit = f"1+{p2}*{x}+{p4}*{x}^2+({p1}*{x}+{p3}*{x}^2)/{relative}"
     even_fit = f"1+{r2}*{x}+{r4}*{x}^2+({r1}*{x}+{r3}*{x}^2)/[even@]"
-    decimals = f"IF({relative}<={brazil.THREE_DECIMALS_TO!r},3,4)"
+    decimals = f"IF({relative}<={petroleum.THREE_DECIMALS_TO!r},3,4)"
     by_density = "[vcf@]*([lr@]-[lr_b])/(1+[lr_s])"
     by_density_cnp = f"-({p1}*{x}+{p3}*{x}^2)/{relative}*[rho_ratio]"
     by_temperature = f"{p2}+2*{p4}*{x}+({p1}+2*{p3}*{x})/{relative}"
