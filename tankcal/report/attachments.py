@@ -357,7 +357,7 @@ def _signature_widget(name, parts, appearance):
         b"/AP<</N %d 0 R>>>>"
         % (
             FIELD_NAME.encode(),
-            _hexadecimal_text(name),
+            b"<FEFF%s>" % name.encode("utf-16-be").hex().upper().encode(),
             rectangle,
             _PRINTED,
             page,
@@ -379,11 +379,6 @@ def _parts_of_link(annotation, tag):
         re.search(rb"/Pg (\d+ 0 R)", tag[1]),
     )
     return [match[1] for match in matches] if all(matches) else None
-
-
-def _hexadecimal_text(words):
-    """Return a text in PDF notation: UTF-16 in hexadecimal digits."""
-    return b"<FEFF%s>" % words.encode("utf-16-be").hex().upper().encode()
 
 
 def _incremental_update(objects, changed):

@@ -207,15 +207,15 @@ def plate(paper):
     rule = (paper.record.get("rule") or {}).get("rule", {})
     if not rule.get("plate"):
         return []
-    lines = [(_plate_label(paper, entry), _plate_text(paper, entry)) for entry in rule["plate"]]
+    lines = []
+    for entry in rule["plate"]:
+        is_number = entry.startswith("certificate_number")
+        label = paper.label("certificate_number" if is_number else entry)
+        lines.append((label, _plate_text(paper, entry)))
     described = "; ".join(f"{label}: {text}" for label, text in lines)
     caption = paper.word("captions.plate", rule=rule["name"])
     alt = paper.word("captions.plate_alt", lines=described)
     return [paper.heading("plate"), blocks.figure(draw_plate(lines), caption, alt)]
-
-
-def _plate_label(paper, entry):
-    return paper.label("certificate_number" if entry.startswith("certificate_number") else entry)
 
 
 def _plate_text(paper, entry):

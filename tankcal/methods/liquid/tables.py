@@ -128,10 +128,6 @@ _METER = _column("meter", "meter", width=10)
 _TO = _column("to_dip_m", "to", "m", decimals=DIP_DECIMALS)
 
 
-def _dip_before_step(paper, row):
-    return _dip_text(paper, row["from_dip_m"])
-
-
 def _dip_text(paper, dip_m):
     """Return the dip at the start of a run or step in words; None is an empty tank."""
     if dip_m is None:
@@ -139,7 +135,8 @@ def _dip_text(paper, dip_m):
     return paper.number(dip_m, decimals=DIP_DECIMALS)
 
 
-_FROM = _column("from_dip_m", "from", "m", text=_dip_before_step, align="right",
+_FROM = _column("from_dip_m", "from", "m", align="right",
+               text=lambda paper, row: _dip_text(paper, row["from_dip_m"]),
                in_sheet={"text": None, "decimals": DIP_DECIMALS})  # fmt: skip
 _W = Column("w", decimals=2, heading="liquid_w", sheet=True, width=8)
 _REDUNDANCY = _column("redundancy", "redundancy", decimals=2, width=10)

@@ -274,7 +274,9 @@ def _fit_fittings(rows, state, at_most=MOST_FITTINGS):
     zeros = find_zeros(rows.dip_m, rows.volume_m3, rows.sd_m3, state.seams_m)
     best, tried = None, 0
     for zero in (state.zero_m,) if state.fittings else (zeros[0], *USUAL_ZEROS_M, *zeros[1:]):
-        most = at_most if best is None else min(at_most, _most_fittings(best))
+        most = at_most
+        if best is not None:  # more fittings than these cost more than the best Fit
+            most = min(at_most, max(int((_cost(best) - LEAST_CHI2 * best.dof) / PRICE), 0))
         candidate = _fit_from_zero(
             rows.select_above(zero + NEAR_M), replace(state, zero_m=zero), most
         )
@@ -307,11 +309,6 @@ def _add_lower_rows(rows, solution):
             if gain < len(chosen.dip_m) - len(solution.left_m3) + SAME_ZERO**2:
                 return again
     return solution
-
-
-def _most_fittings(best):
-    """Largest number of fittings with which another Fit may cost less."""
-    return max(int((_cost(best) - LEAST_CHI2 * best.dof) / PRICE), 0)
 
 
 def _is_plain(solution):

@@ -122,14 +122,10 @@ def lines_of(shown):
     """
     lines = []
     for block in shown:
-        block_lines = _WRITERS.get(block.data["kind"], _skip)(block.data)
+        block_lines = _WRITERS.get(block.data["kind"], lambda _: [])(block.data)
         if block_lines:
             lines += [*([""] if lines else []), *block_lines]
     return [line.translate(_BLANKS).rstrip() for line in lines]
-
-
-def _skip(block):
-    return []
 
 
 def _heading(block):

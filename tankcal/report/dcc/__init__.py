@@ -356,7 +356,7 @@ def _statements(parent, languages):
     if clean(certificate.get("notice")):
         add_statement(parent, languages.word("dcc.notice"), certificate["notice"], "tankcal_notice")
     if doubts_of(languages.record["warnings"]):
-        doubts = languages.each(_doubts)
+        doubts = languages.each(lambda paper: " ".join(doubts_of(paper.record["warnings"])))
         add_statement(parent, languages.word("certificate.doubtful"), doubts, "tankcal_doubt")
     add_statement(
         parent, languages.word("dcc.validity"), languages.word("certificate.only_items"),
@@ -380,10 +380,6 @@ def _statements(parent, languages):
     rule = languages.record.get("rule")
     if rule:
         _verdict(parent, languages, rule)
-
-
-def _doubts(paper):
-    return " ".join(doubts_of(paper.record["warnings"]))
 
 
 def add_statement(parent, names, declared, kind):

@@ -76,25 +76,9 @@ BOTH = f"{CERTIFICATE} {FIELD_TABLE}"
 NOT_SURVEYED = {"drawing", "surface", "dimensions"}  # choices on the thickness without a survey
 
 
-def _day(paper, row):
-    return paper.day(row["survey_date"])
-
-
-def _last_day(paper, row):
-    return paper.day(row.get("survey_end"))
-
-
 def _method(paper, row):
     adjustment = paper.record["adjustment"]
     return method_line(paper.words, adjustment) if adjustment else None
-
-
-def _volume(paper, row):
-    return paper.plain(row["nominal_volume"], "m³")
-
-
-def _expansion(paper, row):
-    return paper.plain(row["expansion"], "1/K")
 
 
 def tank_facts(record):
@@ -115,7 +99,8 @@ def tank_facts(record):
             Column("certificate_number", on=FIELD_TABLE),
             *(Column(f"nominal_{key}", "m", decimals=3, on=CERTIFICATE, sheet=True)
               for key in ("diameter", "height")),
-            Column("nominal_volume", text=_volume, on=CERTIFICATE, sheet=True,
+            Column("nominal_volume", on=CERTIFICATE, sheet=True,
+                   text=lambda paper, row: paper.plain(row["nominal_volume"], "m³"),
                    in_sheet={"text": None, "unit": "m3", "decimals": 3}),
         ),
         rows=lambda record: [row],
@@ -144,7 +129,8 @@ REFERENCES = Table(
         Column("reference_height", "m", decimals=3, on=BOTH, sheet=True),
         Column("reference_temperature", "degC", digits=3, on=BOTH, sheet=True,
                in_sheet={"digits": None, "decimals": 1}),
-        Column("expansion", text=_expansion, on=CERTIFICATE),
+        Column("expansion", on=CERTIFICATE,
+               text=lambda paper, row: paper.plain(row["expansion"], "1/K")),
         Column("table_density", "kg/m3", digits=4, on=BOTH),
         Column("table_pressure", "bar", digits=4, on=BOTH),
     ),
@@ -189,8 +175,10 @@ def _survey(record):
 SURVEY_DATE = Table(
     "survey_date",
     (
-        Column("survey_date", text=_day, sheet=True, in_sheet={"text": None}),
-        Column("survey_end", text=_last_day, sheet=True, optional=True),
+        Column("survey_date", sheet=True, in_sheet={"text": None},
+               text=lambda paper, row: paper.day(row["survey_date"])),
+        Column("survey_end", sheet=True, optional=True,
+               text=lambda paper, row: paper.day(row.get("survey_end"))),
     ),
     rows=_survey,
 )  # fmt: skip
