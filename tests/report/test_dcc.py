@@ -211,22 +211,6 @@ def test_record_and_input_files_are_named_by_their_hashes(example):
     assert found == expected | {"record.json": "sha256:" + "0" * 64}
 
 
-@pytest.mark.slow
-def test_words_that_it_takes_are_all_that_it_needs(example):
-    """A part of the words is read where the record has no survey: the same bytes by all of them."""
-    told = copy.deepcopy(example)
-    told["warnings"] = [{"file": "job.toml", "row": None, "column": "x", "text": "mind this",
-                         "code": None, "values": {}}]  # fmt: skip
-    partly, wholly = (certificate_of(one).decode() for one in (example, told))
-    assert "mind this" in wholly
-    lines = [one for one in wholly.splitlines() if one not in set(partly.splitlines())]
-    assert len(lines) < 8  # the warning itself, nothing else
-    for language in LANGUAGES:
-        some = load_words(language, ("choices", "dcc", "problems"))
-        whole = load_words(language)
-        assert some == {group: whole[group] for group in some}
-
-
 def test_the_same_record_gives_the_same_bytes(example):
     assert certificate_of(example) == certificate_of(copy.deepcopy(example))
 
