@@ -455,7 +455,13 @@ TOLD = [  # of a plan, what is changed in it, the whole line in the column
     (HITS, "hits = 20 ", "hits = 600 ", "expected a whole number from 1 to 500"),
     (LINES, "at_percent = [20]", "at_percent = [180]", "such as 20; 80 (in"),
     (TANGENTS, "radius_m = 12.5", "radius_m = 6.6", "expected 7.11 m or more: the lines between 8"),
-    (TANGENTS, "stations = 8", "stations = 60\nreadings = 20", "24000 tangents; expected at most"),
+    (
+        TANGENTS,
+        "stations = 8\nradius_m = 12.5                    # from the axis of the tank\n"
+        "height_m = 1.5\nat_percent = [20, 80]",
+        "stations = 60\nradius_m = 12.5\nheight_m = 1.5\nreadings = 20\nat_percent = [20, 50, 80]",
+        "36000 tangents; expected at most",
+    ),
     (LINES, "count = 12", "count = 200", "lines: 4800 offsets; expected at most 2000"),
     (LINES, "count = 12", "count = 1", "plan.toml, row"),
     (LINES, "[[straps]]", "[[strap]]", "[[strap]]: unknown section (did you mean straps?)"),
