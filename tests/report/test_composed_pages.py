@@ -53,7 +53,7 @@ def place(matrix, text_matrix):
     return a * x + c * y + e, b * x + d * y + f
 
 
-@pytest.mark.slow(after=4)
+@pytest.mark.slow
 @pytest.mark.parametrize("language", MARKS)
 def test_composed_pages_equal_those_of_the_typesetter(monkeypatch, language):
     made = document_of(language, 2400)
