@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from tankcal.errors import InputError, Problem, TankcalError, VocabularyError, reason_of
-from tankcal.messages import Message
+from tankcal.messages import message
 from tankcal.record import manifest, save
 from tankcal.record.saved_formats import SavedFormat
 from tankcal.record.schema import to_plain
@@ -40,12 +40,6 @@ class SavedDocument:
         renderers() returns two functions, which are imported when they are needed:
         pages(paper, folder=None, whole=False) returns the blocks of the PDF, or with `whole` those
         of the web page; write_workbook(paper, path) writes the workbook.
-    steps : (Message, Message)
-        Messages at the beginning of the tables and of the papers.
-    unreadable : callable
-        unreadable(error) returns the Message for a file that is no JSON.
-    without_content : callable
-        without_content(what) returns the Message for a file with unexpected content.
     tables : Mapping of str to Table
         {name of the CSV file: its table}. A table without rows has no file.
     has_page : bool
@@ -61,9 +55,6 @@ class SavedDocument:
     saved_format: SavedFormat
     paper_of: Callable
     renderers: Callable
-    steps: tuple[Message, Message]
-    unreadable: Callable[[str], Message]
-    without_content: Callable[[str], Message]
     tables: Mapping = field(default_factory=dict)
     has_page: bool = True
     others: Mapping = field(default_factory=dict)
@@ -105,7 +96,10 @@ class SavedDocument:
         try:
             data = read_json(path)
         except (OSError, ValueError, RecursionError) as error:
-            raise InputError(Problem(name, self.unreadable(reason_of(error)))) from error
+            text = message(
+                "saved_file_unreadable", "cannot be read: {error}", error=reason_of(error)
+            )
+            raise InputError(Problem(name, text)) from error
         return self.saved_format.migrated(data, name)
 
     def write(self, result, folder, language=None, progress=None, letterhead=None):
@@ -148,8 +142,7 @@ class SavedDocument:
         from tankcal.report.web import page
 
         pages, write_workbook = self.renderers()
-        writing_tables, setting_papers = self.steps
-        progress(writing_tables)
+        progress(message("document_tables", "writing the tables"))
         save(paper.saved, folder / self.saved_format.file)
         for name, table in self.tables.items():
             if rows := table.rows(paper.record):
@@ -157,7 +150,7 @@ class SavedDocument:
         write_workbook(paper, folder / self._file(".xlsx"))
         for name, write_file in self.others.items():
             write_file(paper, folder / name)
-        progress(setting_papers)
+        progress(message("document_papers", "writing the documents"))
         # The PDF embeds the files that were written before it.
         blocks = [block.data for block in pages(paper, folder)]
         (folder / self._file(".pdf")).write_bytes(pdf(blocks, folder))
@@ -184,7 +177,12 @@ class SavedDocument:
             raise
         except (LookupError, TypeError, ValueError, AttributeError) as error:
             what = f"{type(error).__name__}: {error}"
-        raise InputError(Problem(Path(source).name, self.without_content(what)))
+        text = message(
+            "saved_file_without_content",
+            "lacks the content of a file of this name, or is damaged ({what})",
+            what=what,
+        )
+        raise InputError(Problem(Path(source).name, text))
 
 
 # ---- paper of a saved file other than a record: head of the document and user texts

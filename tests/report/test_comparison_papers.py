@@ -336,7 +336,7 @@ def test_what_is_no_comparison_is_refused(tmp_path, text, said):
 def test_a_damaged_comparison_is_told_in_one_line(tmp_path, change):
     path = tmp_path / "comparison.json"
     path.write_text(json.dumps(plain() | change), encoding="utf-8")
-    with pytest.raises(InputError, match="content of a comparison") as told:
+    with pytest.raises(InputError, match="lacks the content") as told:
         rebuild(path, tmp_path / "out")
     assert len(told.value.problems) == 1
     assert [one.name for one in tmp_path.iterdir()] == ["comparison.json"]

@@ -56,7 +56,7 @@ from tankcal.text.words import load_words
 pytestmark = pytest.mark.slow  # seconds of runs and papers
 
 LANGUAGE_OF = dict(zip(KINDS, [*LANGUAGES, "pt-BR"], strict=True))
-RULES = Path(tankcal.__file__).parent / "inspection" / "rules"
+RULES = Path(tankcal.__file__).parent / "products" / "inspection" / "rules"
 PROGRAM = {"tankcal", "inspection", "mm", "xlsx"}  # and units
 SPACE = "\N{NO-BREAK SPACE}"
 MINUS = "\N{MINUS SIGN}"
@@ -543,7 +543,7 @@ def test_a_damaged_inspection_is_told_in_one_line(tmp_path, change):
         found["generatrices"]["departure_mm"] = [[1.0]]
     path = tmp_path / "inspection.json"
     path.write_text(json.dumps(found), encoding="utf-8")
-    with pytest.raises(InputError, match="content of an inspection") as told:
+    with pytest.raises(InputError, match="lacks the content") as told:
         rebuild(path, tmp_path / "out")
     assert len(told.value.problems) == 1
     assert [one.name for one in tmp_path.iterdir()] == ["inspection.json"]

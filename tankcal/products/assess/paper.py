@@ -3,7 +3,6 @@
 import re
 from typing import ClassVar
 
-from tankcal.messages import message
 from tankcal.products.assess.requirements import ASSESSMENT, GRADES, MAJOR, MINOR, RULE
 from tankcal.report import blocks
 from tankcal.report.plain import words_with_part
@@ -205,16 +204,6 @@ DOCUMENT = SavedDocument(
     ASSESSMENT,
     AssessmentPaper,
     lambda: (pages, write_workbook),
-    steps=(
-        message("assessment_tables", "writing the tables of the assessment"),
-        message("assessment_report", "setting the report of the assessment"),
-    ),
-    unreadable=lambda error: message(
-        "assessment_unreadable", "cannot be read as an assessment: {error}", error=error
-    ),
-    without_content=lambda what: message(
-        "no_assessment", "does not have the content of an assessment ({what})", what=what
-    ),
     tables={"findings.csv": FINDINGS},
     has_page=False,
 )

@@ -12,7 +12,6 @@ from typing import ClassVar
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from tankcal.messages import message
 from tankcal.products.gauge.saved import GAUGE
 from tankcal.report import blocks
 from tankcal.report.plain import words_with_part
@@ -416,16 +415,6 @@ DOCUMENT = SavedDocument(
     GAUGE,
     GaugePaper,
     lambda: (pages, write_workbook),
-    steps=(
-        message("gauge_tables", "writing the tables of the gauge"),
-        message("gauge_papers", "setting the certificate of the gauge"),
-    ),
-    unreadable=lambda error: message(
-        "gauge_unreadable", "cannot be read as a comparison of a gauge: {error}", error=error
-    ),
-    without_content=lambda what: message(
-        "no_gauge", "does not have the content of a comparison of a gauge ({what})", what=what
-    ),
     tables=FILES,
     has_page=False,
     recomputed_by="tankcal.products.gauge.commissioning:compute_again",

@@ -2,7 +2,6 @@
 
 from typing import ClassVar
 
-from tankcal.messages import message
 from tankcal.products.upkeep.saved import UPKEEP
 from tankcal.report import blocks
 from tankcal.report.plain import words_with_part
@@ -428,16 +427,6 @@ DOCUMENT = SavedDocument(
     UPKEEP,
     UpkeepPaper,
     lambda: (pages, write_workbook),
-    steps=(
-        message("upkeep_tables", "writing the tables of the upkeep"),
-        message("upkeep_papers", "setting the report of the upkeep"),
-    ),
-    unreadable=lambda error: message(
-        "upkeep_unreadable", "cannot be read as an upkeep: {error}", error=error
-    ),
-    without_content=lambda what: message(
-        "no_upkeep", "does not have the content of an upkeep ({what})", what=what
-    ),
     tables=FILES,
     has_page=False,
     recomputed_by="tankcal.products.upkeep.recomputation:compute_again",

@@ -7,7 +7,6 @@ from collections import defaultdict
 from typing import ClassVar
 
 from tankcal.job.rule_files import shipped_names, shipped_rule
-from tankcal.messages import message
 from tankcal.record.recalibration import COMPARISON
 from tankcal.report.comparison.tables import COURSES, DELIVERIES, ROWS, WATERFALL, unit_symbol
 from tankcal.report.plain import words_with_part
@@ -160,16 +159,6 @@ DOCUMENT = SavedDocument(
     COMPARISON,
     ComparisonPaper,
     _load_renderers,
-    steps=(
-        message("comparison_tables", "writing the tables"),
-        message("comparison_papers", "setting the papers"),
-    ),
-    unreadable=lambda error: message(
-        "comparison_unreadable", "cannot be read as a comparison: {error}", error=error
-    ),
-    without_content=lambda what: message(
-        "no_comparison", "does not have the content of a comparison ({what})", what=what
-    ),
     tables=TABLES,
 )
 refuse_foreign, rebuild = DOCUMENT.refuse_foreign, DOCUMENT.rebuild

@@ -5,7 +5,6 @@ All values come from history.json; no number is computed here.
 
 from typing import ClassVar
 
-from tankcal.messages import message
 from tankcal.record.recalibration import HISTORY
 from tankcal.report.history.tables import (
     CERTIFICATES,
@@ -89,16 +88,6 @@ DOCUMENT = SavedDocument(
     HISTORY,
     HistoryPaper,
     _load_renderers,
-    steps=(
-        message("history_tables", "writing the tables of the history"),
-        message("history_papers", "setting the papers of the history"),
-    ),
-    unreadable=lambda error: message(
-        "history_unreadable", "cannot be read as a history: {error}", error=error
-    ),
-    without_content=lambda what: message(
-        "no_history", "does not have the content of a history ({what})", what=what
-    ),
     tables=TABLES,
 )
 refuse_foreign, rebuild = DOCUMENT.refuse_foreign, DOCUMENT.rebuild

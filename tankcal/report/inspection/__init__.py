@@ -4,7 +4,6 @@ All files are written from inspection.json; no number is computed here. No file 
 capacity certificate.
 """
 
-from tankcal.messages import message
 from tankcal.record.inspection import INSPECTION
 from tankcal.report.inspection.tables import InspectionPaper
 from tankcal.report.saved_document import SavedDocument
@@ -22,16 +21,6 @@ DOCUMENT = SavedDocument(
     INSPECTION,
     InspectionPaper,
     _load_renderers,
-    steps=(
-        message("inspection_tables", "writing the tables of the inspection"),
-        message("inspection_papers", "setting the papers of the inspection"),
-    ),
-    unreadable=lambda error: message(
-        "inspection_unreadable", "cannot be read as an inspection: {error}", error=error
-    ),
-    without_content=lambda what: message(
-        "no_inspection", "does not have the content of an inspection ({what})", what=what
-    ),
     has_page=False,
 )
 refuse_foreign, rebuild = DOCUMENT.refuse_foreign, DOCUMENT.rebuild

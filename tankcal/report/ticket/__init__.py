@@ -5,7 +5,6 @@ All values come from ticket.json; no number is computed here.
 
 from typing import ClassVar
 
-from tankcal.messages import message
 from tankcal.record.ticket import TICKET
 from tankcal.report import blocks
 from tankcal.report.plain import words_with_part
@@ -150,16 +149,6 @@ DOCUMENT = SavedDocument(
     TICKET,
     TicketPaper,
     _load_renderers,
-    steps=(
-        message("ticket_tables", "writing the tables of the ticket"),
-        message("ticket_pages", "setting the pages of the ticket"),
-    ),
-    unreadable=lambda error: message(
-        "ticket_unreadable", "cannot be read as a ticket: {error}", error=error
-    ),
-    without_content=lambda what: message(
-        "no_ticket", "does not have the content of a ticket ({what})", what=what
-    ),
     tables=TABLES,
     others={XML: _write_xml},
     recomputed_by="tankcal.products.quantity.recomputation:compute_again",
