@@ -118,7 +118,7 @@ def test_a_camera_that_cannot_be_read_is_told_in_the_language(
     assert english(lines) == []
 
 
-ROOMS = ("planning", "linter", "camera/formats", "calibration", "report/planning",
+ROOMS = ("planning", "products/linter", "camera/formats", "calibration", "report/planning",
          "report/camera", "cli")  # fmt: skip
 TOLD_BY = {"Problem", "InputError", "SolutionError", "problem", "warning", "warn", "print", "say",
            "complain", "step", "part", "tell", "progress"}  # fmt: skip
