@@ -132,14 +132,10 @@ def offsets_by_level(paper):
 def largest_departures(record):
     """Return the Table of the rejected offsets and of the offsets with the largest |w|."""
     rows = record["lines"]["offsets"]
-    order = sorted(range(len(rows)), key=lambda i: _rank(rows[i]))
+    ranked = sorted(rows, key=lambda row: (row["state"] != "rejected", -abs(row["w"] or 0.0)))
     rejected = sum(offset["state"] == "rejected" for offset in rows)
-    chosen = [rows[i] for i in order[: max(MOST_SHOWN, rejected)]]
+    chosen = ranked[: max(MOST_SHOWN, rejected)]
     return replace(OFFSETS, rows=lambda record: chosen)
-
-
-def _rank(row):
-    return row["state"] != "rejected", -abs(row["w"] or 0.0)
 
 
 def _group_by_place(offsets):

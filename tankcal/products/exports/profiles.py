@@ -227,8 +227,10 @@ def _texts(file, name, value, row, needed, log):
             log.problem(file, message("export_no_list", "missing; expected a list of texts"),
                         row, name)  # fmt: skip
         return ()
-    is_short_list = isinstance(raw, list) and len(raw) <= MOST_LINES
-    if not is_short_list or not all(map(_is_line, raw)):
+    are_lines = isinstance(raw, list) and all(
+        isinstance(text, str) and text.isprintable() and len(text) <= MOST_LETTERS for text in raw
+    )
+    if not are_lines or len(raw) > MOST_LINES:
         text = message(
             "export_texts", "found {found}; expected a list of at most {most} texts, each of one "
             "line", found=shown(raw), most=MOST_LINES,
@@ -236,11 +238,6 @@ def _texts(file, name, value, row, needed, log):
         log.problem(file, text, value.row or row, name)
         return ()
     return tuple(raw)
-
-
-def _is_line(text):
-    """Whether a value is a text of one line."""
-    return isinstance(text, str) and text.isprintable() and len(text) <= MOST_LETTERS
 
 
 class _Reporter:

@@ -433,7 +433,8 @@ def _factor(tokens, places):
             is_free = not _ROLE_WORD.fullmatch(tokens[k - 1])
         else:
             is_free = False
-        if is_free or not _is_usual_factor(value):
+        is_power_of_ten = value > 0 and abs(log10(value) - round(log10(value))) < 1e-9
+        if is_free or not (is_power_of_ten or value in _PLAIN_FACTORS):
             return 1.0, False, token
         numbers[k], is_multiplied = value, is_multiplied or bool(signs)
     return float(prod(numbers.values())), is_multiplied, ""
@@ -443,11 +444,6 @@ _ROLE_WORD = re.compile(
     "heights?|dips?|innage|levels?|gauge|depth|sounding|altura|nivel|medida|volumen?s?|vols?|"
     "capacity|capacidade?|quantity|quantidade|cantidad|contents?|conteudo|contenido|ullage|outage"
 )
-
-
-def _is_usual_factor(value):
-    """Whether a number is a usual factor of a unit."""
-    return value > 0 and (value in _PLAIN_FACTORS or abs(log10(value) - round(log10(value))) < 1e-9)
 
 
 def _countries(tokens, names):

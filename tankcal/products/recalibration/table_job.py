@@ -1,6 +1,7 @@
 """Jobs from the geometry estimated from a former table, or from the radii in a record."""
 
 import datetime
+import io
 import json
 from dataclasses import dataclass
 
@@ -9,6 +10,8 @@ import numpy as np
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.products.recalibration.solid_geometry import size_sections, uncertainty_rows
+from tankcal.report.saved_document import iso_day
+from tankcal.text.delimited import write_guarded
 
 USUAL_TEMPERATURE_C = 20.0
 UNKNOWN_ZERO_M = 0.02
@@ -166,7 +169,8 @@ def make_upright_job(former, geometry, names, *, u_common_m, e_pa, tank_id):
         **_wall(names, heights, geometry.thickness_m, geometry.radii_m),
     }
     if bottom is not None:
-        texts["bottom.csv"] = _csv(("level_m", "volume_m3"), bottom, (5, 6))
+        rows = [(f"{level:.5f}", f"{volume:.6f}") for level, volume in bottom]
+        texts["bottom.csv"] = _csv(("level_m", "volume_m3"), rows)
     things = _deadwood(geometry, zero + float(np.sum(heights)))
     names_of_things = [
         message("job_thing", "thing-{number}", number=k) for k in range(1, len(things) + 1)
@@ -174,7 +178,7 @@ def make_upright_job(former, geometry, names, *, u_common_m, e_pa, tank_id):
     if things:
         rows = [(name, *thing) for name, thing in zip(names_of_things, things, strict=True)]
         heading = ("name", "bottom_m", "top_m", "volume_m3", "u_m3")
-        texts["deadwood.csv"] = "\n".join(map(",".join, [heading, *rows])) + "\n"
+        texts["deadwood.csv"] = _csv(heading, rows)
     if geometry.state.bulges_m is not None:
         texts["uncertainty.csv"] = _profiles(geometry.state.bulges_m)
     words = (note, *names_of_things)
@@ -241,7 +245,8 @@ def _temperature(former):
 
 
 def _day(former):
-    return former.date if _is_date(former.date) else datetime.date.today().isoformat()
+    day = iso_day(former.date)
+    return day if day and day == former.date else datetime.date.today().isoformat()
 
 
 def _settings(former, *, tank_id, diameter, height, zero, density, source, u_common_m, e_pa, note):
@@ -285,10 +290,6 @@ def _settings(former, *, tank_id, diameter, height, zero, density, source, u_com
     return "\n".join(lines)
 
 
-def _is_date(text):
-    return isinstance(text, str) and len(text) == 10 and text[4] == text[7] == "-"
-
-
 def _text(text):
     return json.dumps(str(text), ensure_ascii=False)
 
@@ -306,34 +307,27 @@ def _roof(former):
 
 
 def _wall(names, heights, plates, radii):
-    names = [_cell(name) for name in names]
-    courses = ["course,height_m,thickness_mm"]
-    courses += [
-        f"{name},{height:.5f},{1000 * plate:.6g}"
-        for name, height, plate in zip(names, heights, plates, strict=True)
-    ]
-    rows = ["course,radius_m"]
-    rows += [f"{name},{radius:.7f}" for name, radius in zip(names, radii, strict=True)]
-    return {"courses.csv": "\n".join(courses) + "\n", "radii.csv": "\n".join(rows) + "\n"}
+    sizes = zip(names, heights, plates, strict=True)
+    courses = [(name, f"{height:.5f}", f"{1000 * plate:.6g}") for name, height, plate in sizes]
+    rows = [(name, f"{radius:.7f}") for name, radius in zip(names, radii, strict=True)]
+    return {
+        "courses.csv": _csv(("course", "height_m", "thickness_mm"), courses),
+        "radii.csv": _csv(("course", "radius_m"), rows),
+    }
 
 
-def _cell(name):
-    return f'"{name}"' if "," in name else name
-
-
-def _csv(heading, rows, decimals):
-    lines = [",".join(heading)]
-    for row in rows:
-        lines.append(",".join(f"{v:.{d}f}" for v, d in zip(row, decimals, strict=True)))
-    return "\n".join(lines) + "\n"
+def _csv(heading, rows):
+    stream = io.StringIO()
+    write_guarded(stream, [heading, *rows])
+    return stream.getvalue()
 
 
 def _profiles(bulges_m):
     """Return uncertainty.csv of the profiles in the table, as the job has straight courses."""
     barrel = 1.5 * np.sqrt(np.mean(np.sum(bulges_m[:, 1::2] ** 2, axis=1)))
     taper = np.sqrt(np.mean(np.sum(bulges_m[:, ::2] ** 2, axis=1)))
-    rows = [f"{name},{1000 * u:.3g},mm" for name, u in (("barrel", barrel), ("taper", taper))]
-    return "\n".join(["input,u,unit", *rows]) + "\n"
+    rows = [(name, f"{1000 * u:.3g}", "mm") for name, u in (("barrel", barrel), ("taper", taper))]
+    return _csv(("input", "u", "unit"), rows)
 
 
 def _deadwood(geometry, top_m):

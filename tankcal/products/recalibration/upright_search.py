@@ -367,16 +367,13 @@ def _add_fitting(rows, solution, longest, about, rough=False):
         if (
             again
             and solution.cost - again.cost > LEAST_GAIN * factor
-            and _is_large(rows, again.state.fittings[-1])
+            # larger than the effect of two rounded digits
+            and abs(again.state.fittings[-1].volume_m3)
+            > LEAST_SIZE * np.sqrt(12) * float(np.median(rows.sd_m3))
             and not (rough and _resembles_joint(again.state, again.state.fittings[-1]))
         ):
             return again
     return None
-
-
-def _is_large(rows, fitting):
-    """Whether a fitting is larger than the effect of two rounded digits."""
-    return abs(fitting.volume_m3) > LEAST_SIZE * np.sqrt(12) * float(np.median(rows.sd_m3))
 
 
 def _simplify_fittings(rows, solution, about):

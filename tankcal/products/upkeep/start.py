@@ -174,7 +174,8 @@ class LyingStock(TableStock):
         self.nominal = {"diameter": self.drawing["diameter_m"], "length": length,
                         "end_depth": depth, "tilt": self.drawing.get("tilt_mm_per_m", 0.0) / 1000,
                         "zero": 0.0}  # fmt: skip
-        self.sd = {name: self.drawing.get(_key_of_u(name), u) / 1000 for name, u in _U.items()}
+        keys_of_u = {name: f"u_{name}_mm" for name in _U} | {"tilt": "u_tilt_mm_per_m"}
+        self.sd = {name: self.drawing.get(keys_of_u[name], u) / 1000 for name, u in _U.items()}
         if self.end == "flat" or not depth:
             self.end = "flat"
             del self.sd["end_depth"]
@@ -246,11 +247,6 @@ class LyingStock(TableStock):
         except SolutionError as error:
             raise InputError(Problem("[drawing]", str(error))) from error
         return tank, np.clip(grid + sizes["zero"], 0.0, tank.top_m)
-
-
-def _key_of_u(name):
-    """Key of [drawing] with the standard uncertainty of a size."""
-    return "u_tilt_mm_per_m" if name == "tilt" else f"u_{name}_mm"
 
 
 def check_drawing(drawing, report):

@@ -331,7 +331,8 @@ def side_rows(paper):
 
 
 def _table_facts(paper, table):
-    """Return {key of a label: text or None} of one table."""
+    """Return {key of a label: text or None} of one table; a date that is no ISO date is kept."""
+    date = table["date"]
     rows = paper.word(
         "texts.rows_of", rows=table["rows"], low=paper.height(table["low_m"]),
         high=paper.height(table["high_m"]),
@@ -341,7 +342,7 @@ def _table_facts(paper, table):
         "origin": paper.word(f"origins_of_tables.{table['origin']}"),
         "laboratory": table["laboratory"],
         "number": table["number"],
-        "date": _day(paper, table["date"]),
+        "date": paper.day(date) if iso_day(date) == date else date,
         "method": table["method"],
         "kind": table["kind"] and paper.word(f"kinds.{table['kind']}"),
         "rows": rows,
@@ -358,11 +359,6 @@ def _table_facts(paper, table):
         "U_of_deliveries": table["U_of_deliveries"]
         and paper.word(f"U_of_deliveries.{table['U_of_deliveries']}"),
     }
-
-
-def _day(paper, text):
-    """Return an ISO date in words; other texts are unchanged."""
-    return paper.day(text) if iso_day(text) == text else text
 
 
 def _stated_U(paper, table):

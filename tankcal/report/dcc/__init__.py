@@ -369,7 +369,8 @@ def _statements(parent, languages):
         add_statement(parent, languages.word("dcc.not_stated"), names, "tankcal_notStated")
     for key in certificate:
         if key not in _OTHER_ELEMENTS and clean(certificate[key]):
-            add_statement(parent, languages.label(key), certificate[key], f"tankcal_{_kind(key)}")
+            kind = "".join(c if c.isascii() and c.isalnum() else "_" for c in key)
+            add_statement(parent, languages.label(key), certificate[key], f"tankcal_{kind}")
     if languages.job.get("next_verification"):
         text = languages.each(next_verification_text)
         names = languages.label("next_verification")
@@ -400,11 +401,6 @@ def _verdict(parent, languages, rule):
     add_text(element, "declaration", text)
     if rule["code"] in _CONFORMITY:
         add_child(element, "conformity", _CONFORMITY[rule["code"]])
-
-
-def _kind(key):
-    """Return a key as a part of the name of a type."""
-    return "".join(sign if sign.isascii() and sign.isalnum() else "_" for sign in key)
 
 
 __all__ = ["DCC", "FILE", "certificate_xml", "language_with"]
