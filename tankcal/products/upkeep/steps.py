@@ -87,6 +87,11 @@ class Steps:
         """Duration of each step, shape (n,)."""
         return np.diff(self.marks.time_ns) * 1e-9
 
+    def day(self, at_s):
+        """ISO date, UTC, of a time in seconds after the first mark."""
+        time = np.datetime64(int(self.marks.time_ns[0] + at_s * 1e9), "ns")
+        return str(time.astype("datetime64[D]"))
+
     @property
     def is_used(self):
         """Whether each step is balanced, shape (n,)."""

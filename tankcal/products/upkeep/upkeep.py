@@ -1,7 +1,7 @@
 """The upkeep of a tank: new table, meters by the tank, months, watching, omitted rows."""
 
 import hashlib
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -10,6 +10,7 @@ import scipy.linalg
 from tankcal.errors import Problem
 from tankcal.gum.coverage import coverage_factor
 from tankcal.messages import message
+from tankcal.products.quantity.table import TankTable
 from tankcal.products.settings import drop_blanks
 from tankcal.products.upkeep import saved
 from tankcal.products.upkeep.estimation import LEAST_RANGE, LEAST_STEPS, estimate
@@ -34,7 +35,6 @@ ONE_SIDED = 1.645  # standard deviations of the 95 % quantile of the usual loss
 WIDE_CHANGE = 1e3  # prior standard deviation of the change of a month, L/h or %
 UNKNOWN = 0.9  # u after over u before, above which a cause is not determined
 ROWS_SHOWN = 4  # deliveries between fifths of the seen levels
-_OF_STOCK = {"no_traceable_meter": "stock_meter"}  # reasons without a calibration
 VARIANCE_RATIO = 2.0  # of observed and declared variances, beyond which a warning is given
 
 
@@ -53,7 +53,7 @@ def keep_up(inputs, state=NO_STATE, *, with_steps=False):
     -------
     saved.UpkeepFile
     """
-    sections, warnings, is_free = inputs.sections, list(inputs.warnings), inputs.start == SALES
+    sections, warnings = inputs.sections, list(inputs.warnings)
     operation, estimation, solutions, probability = estimate_inputs(inputs, state)
     k = float(coverage_factor(probability, np.inf))
     ratio = estimation.triangle.chi2 / max(estimation.triangle.count, 1)
@@ -63,97 +63,61 @@ def keep_up(inputs, state=NO_STATE, *, with_steps=False):
                        "variance; declare level_mm, gauge_wander_mm and the tickets in [priors] as "
                        "observed. U takes the larger variance", ratio=ratio)  # fmt: skip
         warnings.append(Problem(SETTINGS, text, column="priors"))
-    used = estimation.is_used
-    ends = np.append(used, False) | np.append(False, used)
-    levels = estimation.balance.level_m[ends]
-    low, high = (float(levels.min()), float(levels.max())) if ends.any() else (0.0, 0.0)
-    table = inputs.table
-    volume, factor = update_table(estimation, operation.stock, low, high)
-    former_u = np.linalg.norm(table.factor_m3, axis=1)
-    seen = (table.height_m >= low) & (table.height_m <= high)
     watched = watch(estimation, sections["watch"]["false_alarm_per_year"] or 0.05, state)
+    steps = inputs.steps
     if inputs.clock and watched.alarm_s is not None:
-        watched = suspect_clock(watched, (inputs.clock[0] - inputs.steps.marks.time_ns[0]) * 1e-9,
+        watched = suspect_clock(watched, (inputs.clock[0] - steps.marks.time_ns[0]) * 1e-9,
                                 inputs.clock[1])  # fmt: skip
-    reasons = _refusals(estimation, table, low, high, former_u, seen, inputs.traceable)
-    if inputs.start == "drawing" and "wide_former" not in reasons:
-        reasons.append("wide_former")  # a drawing does not know the volume below the levels
-    if is_free:
-        reach = table.height_m[-1] * np.array(CERTIFIED_RANGE)
-        reasons = [_OF_STOCK.get(reason, reason) for reason in reasons if reason != "wide_former"]
-        if not (low <= reach[0] and high >= reach[1]):
-            reasons.append("stock_range")
-        reasons.append("stock_contents")
-    if watched.alarm_s is not None:
-        reasons.append("alarm")
-    causes, (_, u) = estimation.balance.causes, estimation.sizes()
-    if any(u[i] > UNKNOWN * causes.sd[i] for i in np.flatnonzero(
-            np.array(causes.names) == "gauge_zero")):  # fmt: skip
-        reasons.append("zero")
-    reasons += ["tilt"] if is_free else []
+    used = estimation.is_used
+    levels = estimation.balance.level_m[np.append(used, False) | np.append(False, used)]
+    low, high = (float(levels.min()), float(levels.max())) if len(levels) else (0.0, 0.0)
+    reasons = _list_reasons(inputs, estimation, low, high)
+    reasons += ["alarm"] if watched.alarm_s is not None else []
     mode = "improved"
     if {"few_steps", "small_range", "global_test", "outliers", "alarm"} & set(reasons):
         mode = "watched"
     elif {"wide_former", "stock_contents"} & set(reasons):
         mode = "deliveries"
-    is_shown = mode != "deliveries" if not is_free else mode == "deliveries"
-    if mode == "watched":
-        volume, factor = table.volume_m3, table.factor_m3
-    table_scale = 1.0 if mode == "watched" else scale
-    spread = k * table_scale * np.linalg.norm(factor, axis=1)
-    seconds = np.append(0.0, np.cumsum(inputs.steps.seconds))
-    start = inputs.steps.marks.time_ns[0]
-
-    def day(at_s):
-        return str(np.datetime64(int(start + at_s * 1e9), "ns").astype("datetime64[D]"))
-
+    update = TableUpdate(inputs.table, inputs.table, low, high, k)
+    if mode != "watched":
+        volume, factor = update_table(estimation, operation.stock, low, high)
+        update = replace(
+            update, new=replace(inputs.table, volume_m3=volume, factor_m3=scale * factor)
+        )
+    # Without a former table, deliveries are all that can be stated of the contents.
+    is_shown = (mode == "deliveries") == (inputs.start == SALES)
     return saved.UpkeepFile(
         notice=sections["upkeep"]["notice"] or "",
-        tank=table.tank,
-        record_sha256=table.digest,
+        tank=inputs.table.tank,
+        record_sha256=inputs.table.digest,
         coverage_probability=probability,
         k=k,
         **{name: sections["upkeep"][name] for name in ("site", "by", "note", "service")},
         liquid=sections["liquid"]["name"],
         start=saved.UpkeepStart(
-            inputs.start,
-            is_free and bool({"stock_meter", "stock_range"} & set(reasons)),
-            solutions,
+            inputs.start, bool({"stock_meter", "stock_range"} & set(reasons)), solutions
         ),
         mode=mode,
         reasons=reasons,
         period=saved.UpkeepPeriod(
-            day(0.0), day(seconds[-1]), float(seconds[-1] / 86400), inputs.pieces,
-            len(inputs.steps), int(used.sum()), len(estimation.rejected), low, high,
-            float(inputs.steps.sold_m3.sum()), float(inputs.steps.delivered_m3.sum()),
+            steps.day(0.0), steps.day(np.sum(steps.seconds)), float(np.sum(steps.seconds) / 86400),
+            inputs.pieces, len(steps), int(used.sum()), len(estimation.rejected), low, high,
+            float(steps.sold_m3.sum()), float(steps.delivered_m3.sum()),
         ),
         fit=saved.UpkeepFit(estimation.triangle.chi2, estimation.triangle.count,
                             estimation.probability, estimation.passes, scale),
-        rows=[] if not is_shown else [
-            saved.UpkeepRow(float(h), float(old), float(k * u), float(new), float(U),
-                            _error_ratio(new - old, k * u, U), bool(is_seen))
-            for h, old, u, new, U, is_seen in zip(
-                table.height_m, table.volume_m3, former_u, volume, spread, seen, strict=True)
-        ],
-        factor=[] if not is_shown else blocks_of(table_scale * factor),
-        deliveries=_deliveries(table, volume, factor, low, high, k, table_scale),
-        meters=_meters(estimation, operation, inputs, factor, low, high, k, scale),
+        rows=update.rows() if is_shown else [],
+        factor=blocks_of(update.new.factor_m3) if is_shown else [],
+        deliveries=update.deliveries(),
+        meters=_meters(estimation, operation, inputs, update, scale),
         causes=_causes(estimation),
-        months=_months(estimation, start, k, scale),
-        watch=saved.UpkeepWatch(
-            watched.rate, watched.limit, watched.limit_of_model, watched.limit_of_tank,
-            watched.is_provisional, watched.false_alarms, watched.largest,
-            None if watched.alarm_s is None else day(watched.alarm_s), watched.is_named,
-            [saved.UpkeepSuspect(cause.kind, cause.member, cause.unit, day(cause.start_s),
-                                 cause.size, cause.sd, cause.w, cause in watched.names)
-             for cause in watched.suspects[:8]],
-        ),
+        months=_months(estimation, steps.marks.time_ns[0], k, scale),
+        watch=watched.to_save(steps.day),
         cleaning=[_count(log, kind, entry)
                   for (log, kind), entry in sorted(inputs.findings.counts.items())],
         left_out=[
-            saved.UpkeepCount("steps", REASONS[code], int(np.sum(inputs.steps.reason == code)),
-                              None, None)
-            for code in range(1, len(REASONS)) if np.any(inputs.steps.reason == code)
+            saved.UpkeepCount("steps", REASONS[code], int(np.sum(steps.reason == code)), None, None)
+            for code in range(1, len(REASONS)) if np.any(steps.reason == code)
         ],
         inputs=drop_blanks(sections),
         files=_chain(inputs.sources),
@@ -222,22 +186,76 @@ def update_table(estimation, stock, low_m, high_m):
     return table.volume_m3 + change, factor
 
 
-def _refusals(estimation, table, low, high, former_u, seen, traceable):
-    """Codes of refusals and restrictions."""
-    reasons = []
-    if estimation.triangle.count < LEAST_STEPS:
-        reasons.append("few_steps")
-    if high - low < LEAST_RANGE * np.ptp(table.height_m):
-        reasons.append("small_range")
-    if not estimation.is_fitting:
-        reasons.append("outliers")
-    if estimation.probability < GLOBAL_TEST:
-        reasons.append("global_test")
-    if np.any(seen) and np.median(former_u[seen] / table.volume_m3[seen]) > WIDE:
-        reasons.append("wide_former")
-    if not traceable:
-        reasons.append("no_traceable_meter")
-    return reasons
+def _list_reasons(inputs, estimation, low, high):
+    """Codes of shortcomings of the data of levels from low to high, in the order of the report.
+
+    A tank whose table comes from its sales has no former table and no calibration by meters, but
+    its own limits.
+    """
+    table, is_free, causes = inputs.table, inputs.start == SALES, estimation.balance.causes
+    is_seen = (table.height_m >= low) & (table.height_m <= high)
+    former_u = np.linalg.norm(table.factor_m3[is_seen], axis=1) / table.volume_m3[is_seen]
+    bottom, top = table.height_m[-1] * np.array(CERTIFIED_RANGE)
+    is_zero = np.array(causes.names) == "gauge_zero"
+    codes = {
+        "few_steps": estimation.triangle.count < LEAST_STEPS,
+        "small_range": high - low < LEAST_RANGE * np.ptp(table.height_m),
+        "outliers": not estimation.is_fitting,
+        "global_test": estimation.probability < GLOBAL_TEST,
+        # a drawing does not know the volume below the levels
+        "wide_former": not is_free
+        and (inputs.start == "drawing" or (np.any(is_seen) and np.median(former_u) > WIDE)),
+        "stock_meter" if is_free else "no_traceable_meter": not inputs.traceable,
+        "stock_range": is_free and not (low <= bottom and high >= top),
+        "stock_contents": is_free,
+        "zero": np.any(estimation.sizes()[1][is_zero] > UNKNOWN * causes.sd[is_zero]),
+        "tilt": is_free,
+    }
+    return [code for code, applies in codes.items() if applies]
+
+
+@dataclass(frozen=True)
+class TableUpdate:
+    """The table in force and the new one; both are equal if the tank is only watched.
+
+    Attributes
+    ----------
+    former, new : TankTable
+    low_m, high_m : float
+        Levels of the used steps.
+    k : float
+        Coverage factor.
+    """
+
+    former: TankTable
+    new: TankTable
+    low_m: float
+    high_m: float
+    k: float
+
+    def rows(self):
+        """Rows of both tables with U and E_n (list of saved.UpkeepRow)."""
+        former_U, U = (self.k * np.linalg.norm(table.factor_m3, axis=1)
+                       for table in (self.former, self.new))  # fmt: skip
+        height, former, new = self.former.height_m, self.former.volume_m3, self.new.volume_m3
+        return [
+            saved.UpkeepRow(*map(float, (height[i], former[i], former_U[i], new[i], U[i])),
+                            _error_ratio(new[i] - former[i], former_U[i], U[i]),
+                            bool(self.low_m <= height[i] <= self.high_m))
+            for i in range(len(height))
+        ]  # fmt: skip
+
+    def deliveries(self):
+        """Deliveries between fifths of the levels of the steps, and over all of them."""
+        edges = np.linspace(self.low_m, self.high_m, ROWS_SHOWN + 2)
+        result = []
+        for ends in (*pairwise(edges), (self.low_m, self.high_m)):
+            values = [float(end) for end in ends]
+            for table in (self.former, self.new):
+                spread = np.linalg.norm(np.diff(table.factor(np.array(ends)), axis=0))
+                values += [float(np.diff(table.volume(np.array(ends)))[0]), float(self.k * spread)]
+            result.append(saved.UpkeepDelivery(*values))
+        return result
 
 
 def _error_ratio(change, former_U, U):
@@ -246,27 +264,11 @@ def _error_ratio(change, former_U, U):
     return float(change / np.sqrt(difference)) if difference > 1e-12 * former_U**2 else None
 
 
-def _deliveries(table, volume, factor, low, high, k, scale):
-    """Deliveries between fifths of the levels of the steps, and over all of them."""
-    edges = np.linspace(low, high, ROWS_SHOWN + 2)
-    pairs = [*pairwise(edges), (low, high)]
-    new = replace(table, volume_m3=volume, factor_m3=factor)
-    result = []
-    for first, last in pairs:
-        ends = np.array([first, last])
-        values = []
-        for source, share in ((table, 1.0), (new, scale)):
-            spread = np.linalg.norm(np.diff(source.factor(ends), axis=0))
-            values += [float(np.diff(source.volume(ends))[0]), float(k * share * spread)]
-        result.append(saved.UpkeepDelivery(float(first), float(last), *values))
-    return result
-
-
-def _meters(estimation, operation, inputs, factor, low, high, k, scale):
+def _meters(estimation, operation, inputs, update, scale):
     """Meters by the tank, with the correlation to the table between the levels of the steps."""
     causes, covariance = estimation.balance.causes, estimation.covariance
-    count, ends = len(operation.stock.names), np.array([low, high])
-    x = estimation.triangle.estimate
+    count, ends = len(operation.stock.names), np.array([update.low_m, update.high_m])
+    k, x = update.k, estimation.triangle.estimate
     between = np.zeros(len(x))
     between[:count] = np.diff(operation.stock.columns(ends, x[:count]), axis=0)[0]
     sd_table = np.sqrt(max(between @ covariance @ between, 1e-300))

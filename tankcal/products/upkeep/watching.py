@@ -33,6 +33,7 @@ from tankcal.products.upkeep.filtering import (
     total_innovations,
     whiten_steps,
 )
+from tankcal.products.upkeep.saved import UpkeepSuspect, UpkeepWatch
 from tankcal.products.upkeep.state import NO_STATE
 from tankcal.tank.liquid.adjustment import ALIKE
 
@@ -120,6 +121,19 @@ class Watch:
     is_named: bool
     rate: float
     false_alarms: float | None
+
+    def to_save(self, day):
+        """Return the saved.UpkeepWatch; day(seconds) is the date of a time after the first mark."""
+        suspects = [
+            UpkeepSuspect(suspect.kind, suspect.member, suspect.unit, day(suspect.start_s),
+                          suspect.size, suspect.sd, suspect.w, suspect in self.names)
+            for suspect in self.suspects[:MOST_SUSPECTS]
+        ]  # fmt: skip
+        return UpkeepWatch(
+            self.rate, self.limit, self.limit_of_model, self.limit_of_tank, self.is_provisional,
+            self.false_alarms, self.largest, None if self.alarm_s is None else day(self.alarm_s),
+            self.is_named, suspects,
+        )  # fmt: skip
 
 
 def watch(estimation, false_alarm_per_year=0.05, state=NO_STATE):
