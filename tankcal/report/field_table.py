@@ -1,5 +1,7 @@
 """The field table of a gauger: volumes without U, and proportional parts for millimetres."""
 
+from functools import partial
+
 from tankcal.report.numbers import unit
 from tankcal.report.tables.capacity import capacity_rows, capacity_table, parts_table
 from tankcal.report.tables.facts import FIELD_TABLE, REFERENCES, tank_facts
@@ -18,7 +20,7 @@ def table(paper):
     """Blocks of the field table, set side by side as often as the page width allows."""
     record, name = paper.record, "field_table"
     declared, rows = capacity_table(record), capacity_rows(record)
-    across = times_across(paper, rows, declared.on_paper(name, rows), most=MOST_ACROSS)
+    across = partial(times_across, most=MOST_ACROSS)
     symbol = unit(record["job"]["table"]["volume_unit"]).symbol
     block = paper.show(declared, rows, on=name, across=across, unit=symbol)
     return [*note_on_use(paper, rows), block]

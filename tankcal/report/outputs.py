@@ -28,7 +28,7 @@ from tankcal.report.papers import build, is_certifiable
 from tankcal.report.tables import capacity, ship, survey, tank
 from tankcal.report.tables import survey as readings
 from tankcal.text.delimited import guard_formula
-from tankcal.text.digits import PROGRAM, decimals_of_rows, fixed
+from tankcal.text.digits import PROGRAM, decimals_of_rows, fixed_rows
 from tankcal.text.shipped import LANGUAGES
 
 if TYPE_CHECKING:
@@ -234,9 +234,7 @@ def _capacity(record):
     columns = capacity.capacity_columns(record)
     digits = decimals_of_rows(columns["stated_U_m3"], least=LEAST_DECIMALS)
     return {
-        key: [fixed(value, places, PROGRAM) for value, places in zip(values, digits, strict=True)]
-        if "_m3" in key
-        else values
+        key: fixed_rows(values, digits, PROGRAM) if "_m3" in key else values
         for key, values in columns.items()
     }
 

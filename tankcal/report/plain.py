@@ -9,7 +9,14 @@ from datetime import date
 from tankcal.errors import VocabularyError
 from tankcal.report import blocks, numbers
 from tankcal.report.tables import Column, decimals_of_cells
-from tankcal.text.digits import decimals_of, decimals_of_height, fixed, format_significant, shortest
+from tankcal.text.digits import (
+    decimals_of,
+    decimals_of_height,
+    fixed,
+    fixed_rows,
+    format_significant,
+    shortest,
+)
 from tankcal.text.words import marks_of, percent
 
 __all__ = ["Column", "PlainPaper", "words_with_part"]
@@ -181,8 +188,9 @@ class PlainPaper:
             Rows; None: the rows of the record.
         on : str, optional
             Name of the table and of its caption in the paper; None: the name of the Table.
-        across : int, optional
-            Number of parts of a long table side by side on a page.
+        across : int or callable, optional
+            Number of parts of a long table side by side on a page; across(texts) returns it from
+            the cells of each column.
         **values
             Values in the caption.
 
@@ -207,6 +215,7 @@ class PlainPaper:
         caption = self.word(f"captions.{name}", **values)
         mark = self.marks.decimal
         if across:
+            across = across(texts) if callable(across) else across
             return blocks.columns_table(heads, cells, caption, align, across, mark)
         formulas = [number for number, column in enumerate(columns) if column.formulas]
         return blocks.table(heads, cells, caption, align, mark, formulas)
@@ -245,9 +254,7 @@ class PlainPaper:
         if column.digits is not None:
             return [format_significant(value, column.digits, self.marks) for value in scaled]
         decimals = decimals_of_cells(column, rows, factor)
-        return [
-            fixed(value, places, self.marks) for value, places in zip(scaled, decimals, strict=True)
-        ]
+        return fixed_rows(scaled, decimals, self.marks)
 
     def figure(self, figure, name, /, width=1.0, **values):
         """Figure block with caption `captions.<name>` and alternative text `<name>_alt`."""

@@ -354,10 +354,13 @@ class _SearchRows:
 
 
 def _prepare(table):
-    """Return the `_SearchRows` of a table, which does not depend on the minimum height."""
-    rows, pieces = _rows_for_use(table)
-    levels = levels_of(rows, pieces) if len(rows.height_m) else []
-    return _SearchRows(rows, pieces, levels, table.probability)
+    """Return the `_SearchRows` of a table, which it keeps for further minimum heights."""
+    kept = vars(table)  # as functools.cached_property does, whose module could not import this one
+    if "search_rows" not in kept:
+        rows, pieces = _rows_for_use(table)
+        levels = levels_of(rows, pieces) if len(rows.height_m) else []
+        kept["search_rows"] = _SearchRows(rows, pieces, levels, table.probability)
+    return kept["search_rows"]
 
 
 def _find_worst(prepared, minimum_m, is_relative):

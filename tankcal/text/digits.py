@@ -9,7 +9,7 @@ than 5 %, which is possible with one digit (EA-4/02, 6.3).
 
 from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, ROUND_UP, Context, Decimal
-from math import inf, isfinite
+from math import isfinite
 
 NOTHING = "–"
 # Rows of a table in m3 show litres, because deliveries have a smaller uncertainty.
@@ -20,6 +20,9 @@ WITH_U, WITHOUT_U = range(-12, 15), range(-4, 6)
 _LARGEST_LOSS = Decimal("0.05")
 SIGNIFICANT = 2  # digits of u (JCGM 100:2008 7.2.6)
 _WIDE = Context(prec=400)
+_NEAR = 1e-7  # a mantissa, or a height in mm, this close to a bound is compared in decimals
+# Scaled numbers up to this size differ from their 15 digits by less than the distance from a half.
+_LARGEST_CLEAR, _NEAR_HALF = 1e10, 1e-3
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -189,16 +192,50 @@ def decimals_of_rows(
     -------
     list of int
     """
-    most = inf if most is None else most
-    known = [_is_number(u) and u != 0 for u in uncertainties]
-    decimals = [
-        min(decimals_of(u, significant=significant, least=least), most) if here else None
-        for u, here in zip(uncertainties, known, strict=True)
-    ]
-    following = next((d for d in reversed(decimals) if d is not None), unknown)
-    for i in reversed(range(len(decimals))):
-        following = decimals[i] = following if decimals[i] is None else decimals[i]
+    import numpy as np
+
+    u = np.array(uncertainties, dtype=float)
+    known = np.flatnonzero(np.isfinite(u) & (u != 0))
+    if not len(known):
+        return [unknown] * len(u)
+    decimals = np.array(decimals_of_each(u[known], significant=significant, least=least))
+    if most is not None:
+        decimals = np.minimum(decimals, most)
+    following = np.searchsorted(known, np.arange(len(u)))
+    return decimals[np.minimum(following, len(known) - 1)].tolist()
+
+
+def decimals_of_each(uncertainties, *, significant=SIGNIFICANT, least=0):
+    """Return `decimals_of` for each uncertainty of a column (list of int)."""
+    import numpy as np
+
+    u = np.array(uncertainties, dtype=float)
+    is_clear = (u > 1e-200) & (u < 1e200)  # powers of ten beyond would underflow or overflow
+    size = np.where(is_clear, u, 1.0)
+    exponent = np.floor(np.log10(size)).astype(int)
+    mantissa = size / 10.0**exponent
+    # Only numbers next to a power of ten, or to the half below it, require decimal arithmetic.
+    # With a single digit, uncertainties may also be rounded up.
+    half = 10 - 0.5 * 10.0 ** (1 - significant)
+    for bound in (1.0, half, 10.0):
+        is_clear &= (np.abs(mantissa - bound) > _NEAR) & (significant > 1)
+    decimals = significant - 1 - exponent - (mantissa > half)
+    if least is not None:
+        decimals = np.maximum(decimals, least)
+    decimals = decimals.tolist()
+    for i in np.flatnonzero(~is_clear):
+        decimals[i] = decimals_of(uncertainties[i], significant=significant, least=least)
     return decimals
+
+
+def decimals_of_heights(heights_m):
+    """Return `decimals_of_height` for each height of a column (list of int)."""
+    import numpy as np
+
+    millimetres = 1000 * np.array(heights_m, dtype=float)
+    is_whole = np.abs(millimetres - np.rint(millimetres)) < _NEAR
+    return [3 if whole else decimals_of_height(height)
+            for height, whole in zip(heights_m, is_whole.tolist(), strict=True)]  # fmt: skip
 
 
 def decimals_of_height(height_m):
@@ -210,6 +247,25 @@ def decimals_of_height(height_m):
 def fixed(value, decimals, marks=ENGLISH):
     """Format `value` with a number of decimals (0 or more), without a minus sign before zero."""
     return _text(_exact(value), decimals, marks) if _is_number(value) else NOTHING
+
+
+def fixed_rows(values, decimals, marks=ENGLISH):
+    """Format each value of a column as `fixed` does with the decimals of its row (list of str)."""
+    import numpy as np
+
+    size = np.abs(np.array(values, dtype=float))
+    places = np.array(decimals, dtype=float)
+    scaled = size * 10.0**places
+    # Binary numbers round as their 15 digits do, except next to halves; nan is never clear.
+    is_clear = (scaled < _LARGEST_CLEAR) & (places >= 0)
+    is_clear[is_clear] = np.abs(scaled[is_clear] % 1 - 0.5) > _NEAR_HALF
+    rows = zip(values, size.tolist(), scaled.tolist(), decimals, is_clear.tolist(), strict=True)
+    return [
+        (marks.minus if value < 0 and units > 0.5 else "") + _mark(f"{number:.{places}f}", marks)
+        if clear
+        else fixed(value, places, marks)
+        for value, number, units, places, clear in rows
+    ]
 
 
 def format_significant(value, digits, marks=ENGLISH):
@@ -295,13 +351,20 @@ def _round(number, decimals, rounding=ROUND_HALF_UP):
 def _text(number, decimals, marks):
     """Digits with their marks; a zero has no sign."""
     rounded = _round(number, decimals)
-    whole, _, behind = f"{rounded.copy_abs():f}".partition(".")
-    if marks.group and len(whole) >= marks.least:
-        whole = _group_digits(whole[::-1], marks.group)[::-1]
-    if marks.group and marks.of_decimals and len(behind) >= marks.least:
-        behind = _group_digits(behind, marks.group)
     sign = marks.minus if rounded < 0 else ""
-    return sign + whole + (marks.decimal + behind if behind else "")
+    return sign + _mark(f"{rounded.copy_abs():f}", marks)
+
+
+def _mark(digits, marks):
+    """Set the decimal mark and the group marks of a number without sign, such as "12345.6"."""
+    if not marks.group:
+        return digits.replace(".", marks.decimal)
+    whole, _, behind = digits.partition(".")
+    if len(whole) >= marks.least:
+        whole = _group_digits(whole[::-1], marks.group)[::-1]
+    if marks.of_decimals and len(behind) >= marks.least:
+        behind = _group_digits(behind, marks.group)
+    return whole + (marks.decimal + behind if behind else "")
 
 
 def _group_digits(digits, mark):

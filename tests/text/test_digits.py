@@ -12,10 +12,13 @@ from tankcal.text.digits import (
     PROGRAM,
     bound_of_decimals,
     decimals_of,
+    decimals_of_each,
     decimals_of_height,
+    decimals_of_heights,
     decimals_of_mantissa,
     decimals_of_rows,
     fixed,
+    fixed_rows,
     format_significant,
     format_with_u,
     shortest,
@@ -252,6 +255,34 @@ def test_decimals_of_a_mantissa(value, u, decimals):
 )
 def test_decimals_of_rows(column, options, decimals):
     assert decimals_of_rows(column, **options) == decimals
+
+
+# Powers of ten and halves, and their neighbours, which binary numbers may round differently.
+_BOUNDS = np.outer([1, 1.05, 2.675, 9.45, 9.5, 9.95, 9.995, 99.5], 10.0 ** np.arange(-9, 10))
+_COLUMN = np.concatenate(
+    [np.nextafter(_BOUNDS, end).ravel() for end in (0, INF)] + [_BOUNDS.ravel()]
+).tolist()
+
+
+@pytest.mark.parametrize("significant", [1, 2, 3])
+@pytest.mark.parametrize("least", [None, 0, 3])
+def test_a_column_has_the_decimals_of_its_cells(significant, least):
+    options = {"significant": significant, "least": least}
+    column = [*_COLUMN, 0.0, NAN, None, 1e-310, 1e305]
+    assert decimals_of_each(column, **options) == [decimals_of(u, **options) for u in column]
+
+
+@pytest.mark.parametrize("marks", [ENGLISH, ENGLISH_SI, PORTUGUESE, PROGRAM])
+@pytest.mark.parametrize("places", [-1, 0, 2, 6])
+def test_a_column_has_the_texts_of_its_cells(marks, places):
+    column = [*_COLUMN, *(-value for value in _COLUMN), 0.0, -0.0, None, NAN, float("inf"), 1e300]
+    texts = fixed_rows(column, [places] * len(column), marks)
+    assert texts == [fixed(value, places, marks) for value in column]
+
+
+def test_a_column_of_heights_has_the_decimals_of_its_cells():
+    heights = [0.0, 1.25, 1.2345, 9.49999998, 3.0480061, 9.5000049, *np.arange(0, 2, 0.0025)]
+    assert decimals_of_heights(heights) == [decimals_of_height(height) for height in heights]
 
 
 @pytest.mark.parametrize(

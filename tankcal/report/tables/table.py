@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
-from tankcal.text.digits import NOTHING, decimals_of_height, decimals_of_rows
+from tankcal.text.digits import NOTHING, decimals_of_heights, decimals_of_rows
 
 
 @dataclass(frozen=True)
@@ -184,7 +184,7 @@ def decimals_of_cells(column, rows, factor=1.0, rounds_whole=True):
     """
     if column.u is None:
         if column.height:
-            return [decimals_of_height(row.get(column.key) or 0.0) for row in rows]
+            return decimals_of_heights([row.get(column.key) or 0.0 for row in rows])
         if callable(column.decimals):
             return [column.decimals(row) for row in rows]
         return [column.decimals] * len(rows)

@@ -1,5 +1,7 @@
 """The capacity table of the certificate, with the coverage interval of each row."""
 
+from functools import partial
+
 from tankcal.report.tables.capacity import (
     NOT_FOR_USE,
     capacity_rows,
@@ -26,7 +28,7 @@ def capacity_blocks(paper):
         table,
         rows,
         on=name,
-        across=times_across(paper, rows, table.on_paper(name, rows)),
+        across=times_across,
         coverage=paper.coverage(),
         k=min(k_printed, default=None),
     )
@@ -44,12 +46,11 @@ def density_blocks(paper):
     """Table for each additional density of the liquid."""
     blocks, name = [], "capacity_density"
     table, table_rows = capacity_table(paper.record), capacity_rows(paper.record)
-    columns = table.on_paper(name, table_rows)
     for entry in paper.record["densities"]:
         volumes = zip(table_rows, entry["volume_m3"], strict=True)
         rows = [row | {"volume_m3": volume} for row, volume in volumes]
         density = paper.number(entry["density_kg_m3"], "kg/m3", digits=4)
-        across = times_across(paper, rows, columns, most=MOST_ACROSS_OF_DENSITIES)
+        across = partial(times_across, most=MOST_ACROSS_OF_DENSITIES)
         blocks.append(paper.show(table, rows, on=name, across=across, density=density))
     return blocks
 
@@ -65,10 +66,9 @@ def roof_blocks(paper):
     record, shown = paper.record, []
     if rows := record.get("on_high_legs"):
         table = high_legs_table(record)
-        across = times_across(paper, rows, table.on_paper(None, rows))
-        ends = ends_of_high_legs(paper)
+        ends = ends_of_high_legs(paper) | {"coverage": paper.coverage()}
         shown.append(paper.paragraph("not_for_use_marked", mark=NOT_FOR_USE))
-        shown.append(paper.show(table, rows, across=across, coverage=paper.coverage(), **ends))
+        shown.append(paper.show(table, rows, across=times_across, **ends))
     if record.get("roof_corrections"):
         details = {size["code"]: size["value"] for size in record["roof"]}
         density = paper.number(details["roof_reference_density"], "kg/m3", digits=4)
@@ -77,17 +77,13 @@ def roof_blocks(paper):
     return shown
 
 
-def times_across(paper, rows, columns, most=MOST_ACROSS):
-    """Return how often the columns fit side by side on a page, at most `most`.
+def times_across(texts, most=MOST_ACROSS):
+    """Return how often columns fit side by side on a page, at most `most`.
 
     Parameters
     ----------
-    paper : Paper
-        Formatter.
-    rows : list of dict
-        Rows of the table.
-    columns : list of Column
-        Columns of the table.
+    texts : list of list of str
+        Cells of each column.
     most : int, optional
         Largest result.
 
@@ -95,7 +91,7 @@ def times_across(paper, rows, columns, most=MOST_ACROSS):
     -------
     int
     """
-    longest = [max(map(len, paper.column_texts(rows, column))) for column in columns]
+    longest = [max(map(len, column)) for column in texts]
     return max(1, min(most, LETTERS_OF_A_LINE // sum(1 + length for length in longest)))
 
 

@@ -25,7 +25,7 @@ from tankcal.report.workbook.sections import (
 )
 from tankcal.text.digits import (
     LITRE_DECIMALS,
-    decimals_of_height,
+    decimals_of_heights,
     decimals_of_rows,
     format_significant,
     shortest,
@@ -58,7 +58,7 @@ class Rows:
 
 def digits_of_heights(height_m):
     """Return the decimals of heights, 3 or 4; the last row, the top of the shell, is rounded."""
-    return min(max(map(decimals_of_height, height_m[:-1]), default=3), 4)
+    return min(max(decimals_of_heights(height_m[:-1]), default=3), 4)
 
 
 def capacity_sheet(book, record):

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 from xlsxwriter.utility import xl_pixel_width
 
-from tankcal.text.digits import decimals_of_height
+from tankcal.text.digits import decimals_of_heights
 
 ACCENT = "#1F4E79"
 RULE = "#BFC9D4"
@@ -83,7 +83,7 @@ def number_format(digits, percent=False, unit="", power=False):
 
 def height_digits(heights_m):
     """Return the decimals of heights in m: 3, or more for finer heights."""
-    return [3 if height is None else decimals_of_height(height) for height in heights_m]
+    return decimals_of_heights([height or 0.0 for height in heights_m])
 
 
 def day(text):

@@ -18,7 +18,7 @@ from tankcal.report import numbers
 from tankcal.report.tables import decimals_of_cells
 from tankcal.report.workbook.book import Book
 from tankcal.report.workbook.look import DATE, Column, width_of
-from tankcal.text.digits import NOTHING, decimals_of
+from tankcal.text.digits import NOTHING, decimals_of_each
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -404,7 +404,8 @@ def _digits(column, rows, factor):
         return decimals_of_cells(column, rows, factor, rounds_whole=False)
     most = 99 if column.most is None else column.most
     values = [factor * abs(row.get(column.key) or 0.0) for row in rows]
-    return [min(decimals_of(value, significant=column.digits), most) for value in values]
+    decimals = decimals_of_each(values, significant=column.digits)
+    return [min(places, most) for places in decimals]
 
 
 def set_widths(book, sheet, *tables, least=()):
