@@ -131,6 +131,9 @@ class Method:
         English notes in a starter above the sections of job.toml and above the tables.
     no_rows : Message or None
         Problem of a table of readings without rows, in place of points; None: no problem.
+    saved_type : callable or None
+        Function that returns the dataclass (a `record.schema.Saved`) of the saved part; None:
+        nothing is saved.
     saved_note : str
         Description of the saved part in the JSON schema of the record.
     """
@@ -170,6 +173,7 @@ class Method:
     section_notes: ClassVar = {}
     table_notes: ClassVar = {}
     no_rows = None
+    saved_type = None
     saved_note = ""
 
     @property
@@ -472,10 +476,6 @@ class Method:
         return ()
 
     # ---- record
-
-    def saved_type(self):
-        """Dataclass (a `record.schema.Saved`) of the saved part; None: nothing is saved."""
-        return
 
     def is_saved(self, result):
         """Whether the record of a `Result` has a saved part of this method."""

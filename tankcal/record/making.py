@@ -8,6 +8,7 @@ that any rule can be applied later. u includes the common errors of the values.
 
 import platform
 from math import degrees
+from typing import Any
 
 import numpy as np
 import scipy
@@ -33,7 +34,6 @@ from tankcal.pipeline.tanks import Correction
 from tankcal.pipeline.tanks.vertical import nominal_inside_m
 from tankcal.pipeline.wall.shape import wall_shape_of
 from tankcal.record import schema, survey, table
-from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
 from tankcal.record.long_tables import LongTables
 from tankcal.record.schema import Finite, Saved, fill_from, key, to_plain
 from tankcal.record.table import Choice, adjustment_choices, choices_of
@@ -432,9 +432,14 @@ class KeptUp(Saved):
 
 
 def saved_parts_of_methods():
-    """Keys of the methods in a record: {name: (dataclass, description)}."""
-    parts = {method.name: (method.saved_type(), method.saved_note) for method in methods()}
-    return {name: part for name, part in parts.items() if part[0] is not None}
+    """Keys of the methods in a record: {name: (function that returns the type, description)}."""
+    return {m.name: (m.saved_type, m.saved_note) for m in methods() if m.saved_type}
+
+
+def _adjustment_type():
+    from tankcal.record.adjustment import AdjustmentRecord
+
+    return AdjustmentRecord | None
 
 
 class Record(Saved, kw_only=True):
@@ -497,7 +502,7 @@ class Record(Saved, kw_only=True):
     budget: list[table.BudgetLine] = key("of the top row, of the table alone", default=())
     choices: list[Choice] = key("all assumptions")
     warnings: list[schema.WarningRecord] = key("problems that did not stop the job")
-    adjustment: AdjustmentRecord | None = key("null: points were supplied", default=None)
+    adjustment: Any = key("null: points were supplied", kind=_adjustment_type, default=None)
     budgets: list[table.StatedBudget] = key("stated volumes, then deliveries", default=())
     limits: list[table.LimitOfTank] | None = key(
         "volumes of the operating levels; left out if there are none", default=None, optional=True
@@ -557,7 +562,7 @@ def record_of(result):
             budget=table.budget_of(result),
             choices=choices_of(result),
             warnings=schema.warnings_of(result.warnings),
-            adjustment=adjustment and adjustment_of(adjustment, job.measurements),
+            adjustment=adjustment and _adjustment_of(adjustment, job.measurements),
             budgets=table.budgets_of(result),
             limits=result.stated.limits or None,
             deliveries=result.stated.worst,
@@ -573,6 +578,12 @@ def surveys_of(result):
     return {name: method.save(result) for name, method in named if method.is_saved(result)}
 
 
+def _adjustment_of(adjustment, measurements):
+    from tankcal.record.adjustment import adjustment_of  # most jobs supply points
+
+    return adjustment_of(adjustment, measurements)
+
+
 def record_of_adjustment(job, adjustment):
     """Return the record of a survey that was only adjusted; data of a tank are null or empty."""
     measurements = getattr(job, "measurements", None)
@@ -583,7 +594,7 @@ def record_of_adjustment(job, adjustment):
             overrulings=survey.overrulings_of_adjustment(job),
             choices=adjustment_choices(adjustment, measurements),
             warnings=schema.warnings_of(dict.fromkeys((*job.warnings, *adjustment.warnings))),
-            adjustment=adjustment_of(adjustment, measurements),
+            adjustment=_adjustment_of(adjustment, measurements),
         )
     )
     tank_keys = [name for name in record if name not in _HEAD + _OF_A_SURVEY]

@@ -48,7 +48,7 @@ class Saved:
         dataclass(frozen=True, kw_only=kw_only)(cls)
 
 
-def key(doc, *, of=None, times=None, named=None, optional=False, parts=None, **options):
+def key(doc, *, of=None, times=None, named=None, optional=False, kind=None, parts=None, **options):
     """Declare a field that is saved.
 
     Parameters
@@ -64,14 +64,17 @@ def key(doc, *, of=None, times=None, named=None, optional=False, parts=None, **o
         The key, if it is no valid name in Python, such as "from".
     optional : bool, optional
         Whether the key is omitted if the value is None.
+    kind : callable, optional
+        Function that returns the type, for a type whose module is loaded only for the schema; the
+        annotation of the field is `Any`.
     parts : callable, optional
-        For a field that is a dict: function that returns {key: (type, description)}. The entries
+        For a field that is a dict: function that returns {key: (kind, description)}. The entries
         of the dict are saved in place of the field; a missing entry is omitted.
     **options
         Further arguments of `dataclasses.field`.
     """
     about = {"doc": doc, "of": of, "times": times, "named": named, "optional": optional}
-    about["parts"] = parts
+    about |= {"kind": kind, "parts": parts}
     return field(metadata=about, **options)
 
 
@@ -116,10 +119,17 @@ class Key:
 
     key: str
     name: str
-    type: Any
+    kind: Any  # the type, or a function that returns it
     doc: str = ""
     required: bool = True
     is_part: bool = False  # an entry of the dict that is the field
+    is_late: bool = False  # whether `kind` is a function
+
+    @property
+    def type(self):
+        """Type of the value; its module is loaded if necessary."""
+        kind = self.kind() if self.is_late else self.kind
+        return kind | None if self.is_part else kind
 
     def value_in(self, instance):
         """Value of the key in an instance of the dataclass; None for a missing entry."""
@@ -135,20 +145,22 @@ def keys_of(cls):
     for declared in fields(cls):
         if declared.metadata.get("parts"):
             keys += [
-                Key(name, declared.name, kind | None, doc, required=False, is_part=True)
+                Key(name, declared.name, kind, doc, required=False, is_part=True, is_late=True)
                 for name, (kind, doc) in declared.metadata["parts"]().items()
             ]
             continue
+        late = declared.metadata.get("kind")
         keys.append(
             Key(
                 declared.metadata.get("named") or declared.name,
                 declared.name,
-                hints[declared.name],
+                late or hints[declared.name],
                 declared.metadata.get("doc") or attribute_docs.get(declared.name, ""),
                 not declared.metadata.get("optional", False),
+                is_late=late is not None,
             )
         )
-    for text in [item for item in keys if item.type is Message]:
+    for text in [item for item in keys if item.kind is Message]:
         keys.append(Key(f"{text.key}_code", "", str | None, f"code of `{text.key}`"))
         keys.append(Key(f"{text.key}_values", "", dict, f"values of `{text.key}`"))
     return tuple(keys)
@@ -457,7 +469,7 @@ def _object_to_plain(value):
         if item.required or values[item.key] is not None
     }
     for item in keys:
-        if item.type is Message:
+        if item.kind is Message:
             text = as_plain(values[item.key])
             plain[f"{item.key}_code"] = text["code"]
             plain[f"{item.key}_values"] = to_plain(text["values"])
@@ -540,7 +552,7 @@ def _convert_object(cls, data):
         if not item.name or item.key not in data:
             continue
         value = data[item.key]
-        if item.type is Message:
+        if item.kind is Message:
             text = Message(value)
             text.code, text.values = data[f"{item.key}_code"], data[f"{item.key}_values"]
             values[item.name] = text

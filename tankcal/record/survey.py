@@ -231,8 +231,8 @@ def rejections_of(result):
     else:
         return []
     # Row of targets.csv of each target; targets used with hits have no row in the hits' file.
-    targets = result.job.network.targets
-    target_rows = {} if targets is None else dict(zip(targets.point, targets.rows, strict=False))
+    targets = result.job.has_network and result.job.network.targets
+    target_rows = {} if not targets else dict(zip(targets.point, targets.rows, strict=False))
     return [
         RejectedPoint(
             points.names[i], *points.xyz_m[i], residual_m[i], w[i], reason[i],

@@ -1,11 +1,10 @@
 """Checks and readings of point clouds."""
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-import tankcal.clouds
-from tankcal.clouds.contents import CloudHeader
 from tankcal.errors import InputError
 from tankcal.job.checking import has_rows, is_not_given, missing_beside, name_twice, tell
 from tankcal.job.checks.extent import has_survey, sights_given, tells_by_tape
@@ -27,6 +26,9 @@ from tankcal.methods.clouds.columns import (
 from tankcal.survey.scans import KnownTargets, ScanSetup, ScanTarget
 from tankcal.survey.wall_hits import RangingInstrument
 from tankcal.units import ARCSEC
+
+if TYPE_CHECKING:
+    from tankcal.clouds.contents import CloudHeader
 
 FEWEST_TARGETS = 3  # smallest number of targets that determine the pose of a scan
 RIGID = 1e-4  # largest deviation of a pose from a rotation, due to rounding
@@ -383,7 +385,7 @@ class CloudFile:
 
     name: str
     file: str
-    header: CloudHeader
+    header: "CloudHeader"
     unit_m: float
     first: int
     leave_out_m: np.ndarray
@@ -428,10 +430,12 @@ class Clouds:
 
 def make_clouds(values, tables, registers, raw):
     """Build `Clouds` from the values, tables and registers of a job without problems."""
+    from tankcal.clouds import describe_cloud  # jobs without clouds do not load it
+
     given = registers["clouds"]
     files, scans, sides, tools = [], [], [], {}
     for name, keys in given.items():
-        header = tankcal.clouds.describe_cloud(raw.folder / keys["file"])
+        header = describe_cloud(raw.folder / keys["file"])
         unit = unit_of(keys)
         files.append(
             CloudFile(

@@ -47,9 +47,9 @@ class LinesMethod(Method):
         return any(has_rows(tables[name]) for name in self.tables)
 
     def check(self, values, tables, registers, raw, log):
-        from tankcal.methods.lines.readings import check_lines
-
         if self.is_given(tables):
+            from tankcal.methods.lines.readings import check_lines
+
             check_lines(values, tables, registers, raw, log)
 
     def read(self, values, tables, registers, raw):
