@@ -17,6 +17,7 @@ from tankcal.report.plots.style import (
     INK,
     PALE,
     RED,
+    STYLE,
     WIDTH,
     Drawing,
     even_groups,
@@ -41,6 +42,9 @@ LEAST_SHARE = 1e-3  # share of the variance below which no bar is drawn
 LETTERS_OF_A_BAR = 46  # characters in a line of a bar's label
 SHELL_SHARE = 0.03  # largest relative change of the area of a shell with height
 BOTTOM_SHARE = 0.8  # area over that of the shell below which a bottom gets its own panel
+_POLAR_HEIGHT = 2.64  # of the drawing of a section, in radii of its circle
+_EIGHTHS = range(0, 361, 45)  # labelled azimuths, degrees
+_GRID = {"color": STYLE["grid.color"], "linewidth": STYLE["grid.linewidth"], "zorder": 1.5}
 _TURN = (-4, 364)  # azimuth axis in degrees; wider than a turn to show points at north whole
 
 
@@ -120,10 +124,13 @@ def _residual_panels(rings, limit_mm, words):
             ax.vlines(azimuth, 0, residual_mm, color=INK, linewidth=0.8)
         ax.plot(azimuth, residual_mm, "o", color=INK, markersize=2.2, **rasterize_many(azimuth))
         ax.axhline(0, color=GREY, linewidth=0.5)
-        ax.set(xlim=_TURN, ylim=(-limit_mm, limit_mm), xticks=range(0, 361, 45))
-        ax.grid(True)
+        ax.set(xlim=_TURN, ylim=(-limit_mm, limit_mm))
+        ax.grid(True, axis="y")
+        # Lines drawn at once take a tenth of the time of the ticks of another axis.
+        ax.vlines(_EIGHTHS, -limit_mm, limit_mm, **_GRID)
+        ax.xaxis.set_visible(ax is axes[-1])
         ax.set_title(", ".join(ring.title(words)), loc="left", fontsize=8, pad=2, parse_math=False)
-    axes[-1].set_xlabel(words("azimuth"))
+    axes[-1].set(xlabel=words("azimuth"), xticks=_EIGHTHS)
     figure.supylabel(words("residual"), fontsize=8.5, x=0.005)
     set_margins(figure, left=0.55, right=0.12, bottom=0.42, top=0.2, hspace=0.6)
     return figure
@@ -166,25 +173,27 @@ def _polar_panels(rings, factor, words):
     """Figure of sections about their circles, with a common enlargement."""
     columns = 3 if len(rings) <= 6 else 4
     rows = ceil(len(rings) / columns)
-    figure = Drawing(figsize=(WIDTH, 5.4 / columns * rows))
-    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    size = 5.4 / columns
+    figure = Drawing(figsize=(WIDTH, size * rows))
+    # All sections share one Axes, since matplotlib takes 4 ms to make and draw an empty one.
+    height, width = _POLAR_HEIGHT, _POLAR_HEIGHT * WIDTH / columns / size
+    ax = figure.add_axes((0, 0, 1, 1))
+    ax.set(xlim=(0, columns * width), ylim=(-rows * height, 0))
+    ax.axis("off")
     angle = np.linspace(0, 2 * np.pi, 361)
-    for ax, ring in zip(axes, rings, strict=False):
-        ax.plot(np.sin(angle), np.cos(angle), color=FAINT, linewidth=0.6)
-        line = _enlarged(ring.outline_deg, ring.deviation_m / ring.radius_m, factor)
-        closed = np.concatenate([line, line[:, :1]], axis=1)
-        ax.plot(*closed, color=INK)
+    for number, ring in enumerate(rings):
+        row, column = divmod(number, columns)
+        centre = np.array([[(column + 0.5) * width], [-(row + 0.5) * height]])
+        ax.plot(*(centre + [np.sin(angle), np.cos(angle)]), color=FAINT, linewidth=0.6)
+        line = centre + _enlarged(ring.outline_deg, ring.deviation_m / ring.radius_m, factor)
+        ax.plot(*np.concatenate([line, line[:, :1]], axis=1), color=INK)
         residual = np.asarray(ring.residual_m) / ring.radius_m
-        points = _enlarged(ring.azimuth_deg, residual, factor)
+        points = centre + _enlarged(ring.azimuth_deg, residual, factor)
         are_few = points.shape[1] <= 200  # many points would hide the outline
         style = {"markersize": 2.2, "zorder": 3} if are_few else {"markersize": 1.0, "zorder": 1}
         ax.plot(*points, ".", color=RED, **style, **rasterize_many(points[0]))
-        ax.set(aspect="equal", xlim=(-1.32, 1.32), ylim=(-1.32, 1.32))
         title = "\n".join(ring.title(words))
-        ax.text(0, 0, title, ha="center", va="center", fontsize=8, parse_math=False)
-    for ax in axes:
-        ax.axis("off")
-    figure.subplots_adjust(left=0, right=1, bottom=0, top=1, wspace=0, hspace=0)
+        ax.text(*centre[:, 0], title, ha="center", va="center", fontsize=8, parse_math=False)
     return figure
 
 
@@ -226,7 +235,7 @@ def deviation_map(azimuth_deg, height_m, residual_m, joints_m, words=english_lab
         **rasterize_many(azimuth_deg),
     )  # fmt: skip
     ax.hlines(joints_m, *_TURN, color=GREY, linewidth=0.5)
-    ax.set(xlim=_TURN, xticks=range(0, 361, 45))
+    ax.set(xlim=_TURN, xticks=_EIGHTHS)
     return _unrolled(figure, ax, dots, words, "residual")
 
 
@@ -263,7 +272,7 @@ def field_map(azimuth_deg, height_m, departure_m, points, joints_m, words=englis
     )  # fmt: skip
     ax.plot(*points, ".", color=GREY, markersize=1.2, **rasterize_many(points[0]))
     ax.hlines(joints_m, 0, 360, color=GREY, linewidth=0.5)
-    ax.set(xlim=(0, 360), xticks=range(0, 361, 45), ylim=(joints_m[0], joints_m[-1]))
+    ax.set(xlim=(0, 360), xticks=_EIGHTHS, ylim=(joints_m[0], joints_m[-1]))
     return _unrolled(figure, ax, mesh, words, "departure")
 
 
