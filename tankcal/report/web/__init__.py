@@ -378,12 +378,12 @@ def _face(style, letters):
     """Return a CSS rule @font-face with the given letters in a style of the font."""
     (package,) = find_spec("matplotlib").submodule_search_locations
     path = Path(package) / "mpl-data/fonts/ttf" / f"{_STYLES[style]}.ttf"
-    data = base64.b64encode(_reduced_font(path.read_bytes(), letters)).decode("ascii")
+    data = base64.b64encode(reduce_font(path.read_bytes(), letters)).decode("ascii")
     look = {"": "", "italic": "font-style:italic;", "bold": "font-weight:bold;"}[style]
     return f"@font-face{{font-family:{_FAMILY};{look}src:url(data:font/woff;base64,{data})}}"
 
 
-def _reduced_font(font, letters):
+def reduce_font(font, letters):
     """Return a TrueType font as WOFF 1.0 with the glyphs of some letters and their ligatures.
 
     Glyphs keep their numbers, so that the tables of kerning and ligatures remain valid. The other
@@ -423,10 +423,10 @@ def _reduced_font(font, letters):
         b"name": pack(">3H", 0, 0, 6),  # no names
         b"post": pack(">L", 0x30000) + tables[b"post"][4:32],  # no names of glyphs
     }
-    return _woff({tag: reduced.get(tag, tables[tag]) for tag in _TABLES})
+    return pack_woff({tag: reduced.get(tag, tables[tag]) for tag in _TABLES})
 
 
-def _woff(tables):
+def pack_woff(tables):
     """Return the tables of a TrueType font, {tag: bytes}, as a file in the format WOFF 1.0."""
     end = 44 + 20 * len(tables)
     whole_size = 12 + 16 * len(tables)  # of the font before compression
