@@ -604,6 +604,19 @@ def test_starter_is_complete_once_filled_in(tmp_path, language):
     assert computed(place)["tank"] == "TK-1"
 
 
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_empty_readings_are_named_beside_a_missing_record(tmp_path, language, capsys):
+    folder = write(tmp_path / "gauge", gauge={"record": "record.json"})
+    (folder / "readings.csv").write_text("")
+    assert main(["gauge", str(folder), "--quiet", "--language", language]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    empty = {"en": "empty", "es": "vacío", "pt-BR": "vazio"}[language]
+    starts = [line.partition(f": {empty}")[0].partition("gauge.record")[0] for line in lines]
+    assert starts[0] == "tankcal: readings.csv"
+    assert starts[1].startswith("tankcal: gauge.toml")
+    assert len(starts) == 2
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_certificate_and_files(folder, tmp_path, language, capsys):

@@ -282,6 +282,63 @@ def test_missing_time_zone_is_refused(capsys, tmp_path, language):
     assert expected[language] in line
 
 
+EMPTY = ("the file is empty", "el archivo está vacío", "o arquivo está vazio")
+NO_VALUES = ("no row has a valid time and value", "ninguna fila tiene hora y valor válidos",
+             "nenhuma linha tem horário e valor válidos")  # fmt: skip
+LINES = {  # file: bad content, and where and how its line begins in each language
+    "record.json": ("", ("record.json: cannot", "record.json: no se", "record.json: não")),
+    "meters.csv": ("", ("meters.csv: empty", "meters.csv: vacío", "meters.csv: vazio")),
+    "meters.log": ("", [f"meters.log: {text}" for text in EMPTY]),
+    "deliveries.log": (" \n\n", [f"deliveries.log: {text}" for text in EMPTY]),
+    "levels.log": ("time,level\n", ("levels.log, row 1: no column level_mm",
+                                    "levels.log, fila 1: sin columna level_mm",
+                                    "levels.log, linha 1: sem coluna level_mm")),
+    "events.log": ("time,kind\n2025-02-01T00:00:00,moved\n", (
+        "events.log, row 2, kind", "events.log, fila 2, kind", "events.log, linha 2, kind")),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("place", "language"), [*enumerate(LANGUAGES)])
+def test_problems_of_all_files_are_named_in_a_run(capsys, tmp_path, place, language):
+    """A line for each planted fault, and no other; an empty log is called empty, not a copy."""
+    kinds = ("levels", "meters", "deliveries", "events")
+    (tmp_path / "upkeep.toml").write_text(
+        '[upkeep]\nrecord = "record.json"\ntimezone = "UTC"\nservice = "station"\n[liquid]\n'
+        "expansion_per_k = 0\nbase_c = 15\n[gauge]\nresolution_mm = 0.1\n"
+        + "".join(f'[{kind}]\nfiles = ["{kind}.log"]\n' for kind in kinds)
+    )
+    for name, (content, _) in LINES.items():
+        (tmp_path / name).write_text(content)
+    assert cli.main(["upkeep", str(tmp_path), "--quiet", "--language", language]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == len(LINES)
+    for _, texts in LINES.values():
+        assert sum(f"tankcal: {texts[place]}" in line for line in lines) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["levels.csv", "air.csv"])
+def test_a_log_with_headings_only_is_refused(capsys, folder, name):
+    """No level, or no temperature of the air, although a log of it is declared."""
+    heading = {"levels.csv": "time,level_mm", "air.csv": "time,temperature_c"}[name]
+    (folder / name).write_text(f"{heading}\n")
+    with open(folder / "upkeep.toml", "a") as stream:
+        stream.write('\n[air]\nfiles = ["air.csv"]\n' if name == "air.csv" else "")
+    shown, _ = run(capsys, folder, status=2)
+    assert hold(shown, *(f"{name}: {text}" for text in NO_VALUES))
+
+
+@pytest.mark.slow
+def test_levels_are_checked_beside_meters_without_volume(capsys, folder):
+    """The changed heading in the levels is named in the run that refuses the meters."""
+    change_rows(folder, "meters.csv.log", lambda row: None)
+    change_rows(folder, "levels.csv", lambda row: row if row[0] < DAY else ["time", "temperature"])
+    shown, _ = run(capsys, folder, status=2)
+    assert hold(shown, "no metered volume", "sin volumen medido", "sem volume medido")
+    assert hold(shown, "the heading changes to", "el encabezado cambia a",
+                "o cabeçalho muda para")  # fmt: skip
+
+
 @pytest.mark.slow
 def test_leak_and_breathing_are_a_sum(capsys, record, tmp_path):
     """A loss of 0.8 L/h is stated as a leak or another loss by time, with the season in words."""

@@ -207,6 +207,8 @@ def test_bad_start_is_one_line(tmp_path, capsys, language):
         '[levels]\nfiles = ["a.csv"]\n[meters]\nfiles = ["b.csv"]\n'
         '[drawing]\nend = "conical"\ndip_from_a_m = 2\n'
     )
+    (folder / "a.csv").write_text("time,level_mm\n")
+    (folder / "b.csv").write_text("time,volume_l\n")
     table = write_table(tmp_path / "old", "")
     run = ["upkeep", str(folder), "--quiet", "--language", language]
     for more, count, text in (

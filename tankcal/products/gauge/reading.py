@@ -204,16 +204,16 @@ def read_files(settings, readings):
         With every problem of the files.
     """
     source, table = _read_files(Path(settings), Path(readings), Log())
+    source.log.stop_if_problems()
     return source.sections, table
 
 
 def _read_files(settings, readings, log):
-    """(`_Source`, `ColumnValues`) of both files."""
+    """(`_Source`, `ColumnValues`) of both files; problems are in the log."""
     sections, places, marks = read_sections(settings, SECTIONS, log)
     data = None if marks is None else read_bytes(readings, log)
     raw = None if data is None else read_csv(READINGS, data, *marks, log, settings.name)
     table = None if raw is None else read_columns(None, raw, log, COLUMNS)
-    log.stop_if_problems()
     return _Source(settings.name, sections, places, log), table
 
 

@@ -139,6 +139,9 @@ class LogFile:
             return
         options, columns = self.profile.file, self.profile.columns
         layout = self._find_layout()
+        if not layout.headings:
+            text = message("upkeep_empty_log", "the file is empty; expected the rows of the log")
+            return self.log.problem(self.path.name, text)
         present = list(options["headings"]) if options.get("headings") else layout.headings
         used = {present.index(heading): column
                 for column, heading in columns.items() if heading in present}  # fmt: skip

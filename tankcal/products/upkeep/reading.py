@@ -3,6 +3,7 @@
 import hashlib
 import os
 import tomllib
+from collections import deque
 from dataclasses import dataclass, replace
 from pathlib import Path
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
@@ -105,6 +106,8 @@ METER_COLUMNS = (
     number("u_wear_ppm", "per year", 0, 1e5),
     Field("certificate", "text", ""),
 )
+
+NO_VALUES = message("upkeep_no_values", "no row has a valid time and value; expected such rows")
 
 
 @dataclass(frozen=True)
@@ -256,8 +259,7 @@ def read_upkeep(folder, state=NO_STATE, source=None):
             tell(f"{kind}.files", message("upkeep_no_files", "missing; expected the files of the "
                  "log"))  # fmt: skip
     log.stop_if_problems()
-    start = _open_source(source, folder, sections, tell)
-    log.stop_if_problems()
+    start, record = _open_source(source, folder, sections, tell, log)
     findings, sources = Findings(), [LogSource("settings", settings.name, digest_of(settings))]
     for path in () if start is None else start.files:
         name = Path(os.path.relpath(path, folder)).as_posix()
@@ -268,14 +270,13 @@ def read_upkeep(folder, state=NO_STATE, source=None):
         for kind in ("events", "meters", "deliveries", "air", "levels")
     }
     meters = _read_meters(folder, marks, log, sources)
-    record = None if start is None else records.load(start.path)
     former = record and record.get("upkeep")
     known = {source.sha256: source.file for source in sources if source.kind not in FIXED}
     for digest in sorted(known.keys() & set(former["logs"] if former else ())):
         log.problem(known[digest], message(
             "upkeep_known_log", "the table in force contains this log; expected logs of a later "
             "time: it would count twice"))  # fmt: skip
-    log.stop_if_problems()
+    _stop_at_problems(files, log)
     expansion, base = (sections["liquid"][key] for key in ("expansion_per_k", "base_c"))
     stock = (
         LyingStock(sections["drawing"], expansion, base)
@@ -297,22 +298,27 @@ def read_upkeep(folder, state=NO_STATE, source=None):
     return replace(inputs, record_path=start.path, start=start.kind, holder=start.holder)
 
 
-def _open_source(source, folder, sections, report):
-    """`StartTable` of a source, or of `record` of upkeep.toml; None without a calibration."""
+def _open_source(source, folder, sections, report, log):
+    """(`StartTable` or None, its record or None) of a source, or of `record` of upkeep.toml."""
     source = source or sections["upkeep"]["record"]
-    sections["upkeep"]["record"], start = source, None
+    sections["upkeep"]["record"] = source
     if source is None:
         report("upkeep.record", message("upkeep_no_source", "missing; expected record.json of the "
              "tank, a table, a job, or {word}", word=WITHOUT_TABLE))  # fmt: skip
     elif source == WITHOUT_TABLE:
         check_drawing(sections["drawing"], report)
     else:
-        start = open_start(folder / source)
-        if start is None:
+        try:
+            start = open_start(folder / source)
+            if start is not None:
+                return start, records.load(start.path)
+        except InputError as error:
+            log.problems.extend(error.problems)
+        else:
             report("upkeep.record", message("upkeep_no_record", "found {name}, where no record, "
                  "table or job is; expected record.json of the tank, a table, or a job folder",
                  name=shown(source)))  # fmt: skip
-    return start
+    return None, None
 
 
 def _log_files(kind, sections, folder, zone, findings, log, sources):
@@ -331,7 +337,7 @@ def _log_files(kind, sections, folder, zone, findings, log, sources):
         for path in paths:
             digest = hash_file(path)
             twin = next((source.file for source in sources if source.sha256 == digest), None)
-            if twin is not None:
+            if twin is not None and path.stat().st_size:  # an empty file is no copy
                 text = message("upkeep_file_twice", "content equal to that of {twin}; expected "
                                "each log once: it would count twice", twin=twin)  # fmt: skip
                 log.problem(path.name, text)
@@ -385,11 +391,11 @@ def _build(sections, stock, meters, files, findings, sources, log, state):
     adjusted = [(event["meter"], event["time"]) for event in events if event["kind"] == "adjusted"]
     flows = read_flows(files["meters"], adjusted)
     tickets = _read_tickets(files["deliveries"], findings)
-    air = _read_air(files["air"])
-    log.stop_if_problems()
-    if not flows or not any(len(flow.time_ns) for flow in flows):
+    air = _read_air(files["air"], log)
+    if not log.problems and not any(len(flow.time_ns) for flow in flows):
         text = message("upkeep_no_flow", "no metered volume; expected sales or receipts")
-        raise InputError(Problem(files["meters"][0].path.name, text))
+        log.problem(files["meters"][0].path.name, text)
+    _stop_at_problems({"events": (), "levels": files["levels"]}, log)
     _refuse_copies(files["meters"] + files["deliveries"], log)
     span = 400 * 86400 * 10**9
     first = min(flow.begin_ns.min() for flow in flows if len(flow.time_ns)) - span
@@ -399,6 +405,8 @@ def _build(sections, stock, meters, files, findings, sources, log, state):
     sums.read(files["levels"], state)
     for file in files["levels"]:
         compare_own_volumes(file, table, findings, events, log)
+    if not log.problems and not findings.number("levels", "row"):
+        log.problem(files["levels"][0].path.name, NO_VALUES)
     log.stop_if_problems()
     pieces = sums.means(findings)
     inside = ~table.is_outside(pieces.level_m)
@@ -442,6 +450,16 @@ def _build(sections, stock, meters, files, findings, sources, log, state):
                for source in sources]  # fmt: skip
     return Inputs(sections, operation, steps, findings, tuple(sources), len(pieces), traceable,
                   tuple(log.warnings), clock=clock)  # fmt: skip
+
+
+def _stop_at_problems(unread, log):
+    """Raise InputError with the problems of the log, and of the logs {kind: files} not yet read."""
+    if log.problems:
+        _read_events(unread["events"], log)
+        for kind in [kind for kind in unread if kind != "events"]:
+            for file in unread[kind]:
+                deque(file.chunks(), maxlen=0)  # each chunk reports its problems
+    log.stop_if_problems()
 
 
 def _refuse_copies(files, log):
@@ -524,12 +542,14 @@ def _read_tickets(files, findings):
                    temperature[kept].astype(float), row[kept])  # fmt: skip
 
 
-def _read_air(files):
-    """(times, temperatures) of the air; None without files."""
+def _read_air(files, log):
+    """(times, temperatures) of the air; None without files, or after a problem."""
     parts = [(chunk["time"], chunk["temperature"]) for file in files for chunk in file.chunks()]
     if not parts:
         return None
     time, values = (np.concatenate(part) for part in zip(*parts, strict=True))
+    if not np.isfinite(values).any():
+        return log.problem(files[0].path.name, NO_VALUES)
     order = np.argsort(time, kind="stable")
     order = order[np.isfinite(values[order])]
     return time[order].astype(float), values[order]
