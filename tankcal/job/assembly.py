@@ -37,7 +37,7 @@ from tankcal.job.model import (
 )
 from tankcal.job.structure import structure, to_si
 from tankcal.job.tables import fingerprint, read_beside
-from tankcal.job.tapes import gauged
+from tankcal.job.tapes import mean_plates
 from tankcal.messages import message
 from tankcal.tank.rules import Rule
 
@@ -120,8 +120,8 @@ def read_mesh_file(folder, name, log):
 
 def inputs_of(values, tables):
     """Inputs of uncertainty: declared rows, then assumed inputs in the order of INPUTS."""
-    declared = _declared(tables["uncertainty"])
-    return (*declared, *_assumed(values, tables, {item.name for item in declared}))
+    declared = _declared_inputs(tables["uncertainty"])
+    return (*declared, *_assumed_inputs(values, tables, {item.name for item in declared}))
 
 
 def correlations_of(table):
@@ -141,7 +141,7 @@ def stated_of(table):
     )
 
 
-def _declared(table):
+def _declared_inputs(table):
     if table is None:
         return ()
     # A normal distribution of type B with infinite degrees of freedom is the default.
@@ -162,7 +162,7 @@ def _declared(table):
     )
 
 
-def _assumed(values, tables, declared):
+def _assumed_inputs(values, tables, declared):
     """Yield the assumed inputs that affect the job and are not declared."""
     useless = useless_inputs(values, tables, values["tank"]["kind"])
     values_of_job = {"roof_mass": values["roof"]["mass_kg"]}
@@ -224,7 +224,7 @@ def make_job(raw, values, tables, attached, measurements, warnings):
 
 def _optional(kind, given):
     """Object of a section; None if all its keys are blank."""
-    return structure(kind, given) if _given(given) else None
+    return structure(kind, given) if _drop_none(given) else None
 
 
 def make_frame(raw, values, tables, measurements, warnings, has_points=True):
@@ -250,18 +250,18 @@ def make_frame(raw, values, tables, measurements, warnings, has_points=True):
         ),
         courses=_courses(tables) if kind == "vertical" else (),
         points=None,
-        certificate=_given(values["certificate"]),
+        certificate=_drop_none(values["certificate"]),
         snooping=adjustment["snooping"] is not False,
         scale=adjustment["scale"] or "a_priori",
         files=tuple(InputFile(*file) for file in raw.files),
         warnings=warnings,
         source=raw.source,
-        switches=Switches(**_given(values["corrections"])),
+        switches=Switches(**_drop_none(values["corrections"])),
         measurements=measurements,
     )
 
 
-def _given(values):
+def _drop_none(values):
     """Items of a dict whose value is not None."""
     return {key: value for key, value in values.items() if value is not None}
 
@@ -272,7 +272,7 @@ def _tank(values):
         return None
     sizes = [name for name in values if name.startswith("nominal_")]
     texts = {name: value for name, value in values.items() if name not in (*sizes, "id", "kind")}
-    return structure(Tank, values, details=_given(texts))
+    return structure(Tank, values, details=_drop_none(texts))
 
 
 def _survey(values):
@@ -288,7 +288,7 @@ def _pascals(pressure_bar):
 
 
 def _datum(values, kind, has_points):
-    if kind is None and not _given(values):
+    if kind is None and not _drop_none(values):
         return None
     # Without points, z counts from the inside bottom beneath the dip point.
     has_own_frame = kind in ("horizontal", "sphere") and not has_points
@@ -308,7 +308,7 @@ def _table(values):
 
 def _courses(tables):
     table, welds = tables["courses"], tables["welds"]
-    gauge_means = gauged(tables["thickness"]) if is_strapped(tables) else {}
+    gauge_means = mean_plates(tables["thickness"]) if is_strapped(tables) else {}
     if table is None:
         return ()
     azimuths = {}

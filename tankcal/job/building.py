@@ -74,7 +74,7 @@ def job_of(raw, log, is_whole=True):
     equipment = (
         () if values is None else equipment_used(values["survey"], registers["equipment"], raw, log)
     )
-    attached = _attached(raw, values, log) if is_whole else None
+    attached = _read_attachments(raw, values, log) if is_whole else None
     log.stop_if_problems()
     measurements = None
     if has_survey(tables):
@@ -235,7 +235,7 @@ def _missing(raw, name):
     )
 
 
-def _attached(raw, values, log):
+def _read_attachments(raw, values, log):
     """Read the files beside the settings; values is None if the settings are unreadable."""
     mesh = rule = None
     if values is not None:

@@ -103,7 +103,7 @@ def parameters_of(given, settings):
     -------
     list of Parameter, length 13
     """
-    given = at_focus(given)
+    given = focus_distortion(given)
     return [_parameter(name, given, settings) for name in PARAMETERS]
 
 
@@ -129,7 +129,7 @@ def lens_of(given):
     return Lens(focal, 1000 * focus, 1000 * np.array(distances), np.array(pairs).T)
 
 
-def at_focus(given):
+def focus_distortion(given):
     """Keys of a camera, with K1, K2, K3 at its focus where two calibrations determine them."""
     lens = lens_of(given)
     if lens is None:
@@ -357,9 +357,9 @@ def imagery_of(tables, cameras, adjustment):
     if photos is None:
         return imagery
     if tables["fiducials"] is not None:
-        imagery = _transformed(imagery, tables, cameras, adjustment or {})
+        imagery = _transform_by_marks(imagery, tables, cameras, adjustment or {})
     if tables["film"] is not None:
-        imagery = _flattened(imagery, tables, cameras)
+        imagery = _correct_unflatness(imagery, tables, cameras)
     return imagery
 
 
@@ -369,7 +369,7 @@ def cameras_of_photos(photos, cameras):
     return {photo: (name, cameras[name]) for photo, name in rows if photo and name in cameras}
 
 
-def _transformed(imagery, tables, cameras, adjustment):
+def _transform_by_marks(imagery, tables, cameras, adjustment):
     """Apply the transformations of the fiducial marks to the image points."""
     images = tables["image_points"]
     default = (adjustment.get("image_sd_um") or np.nan) / 1000
@@ -583,7 +583,7 @@ def is_surface(surface):
     return bool(spread[1] > FLAT * spread[0])
 
 
-def _flattened(imagery, tables, cameras):
+def _correct_unflatness(imagery, tables, cameras):
     """Correct the image points for unflatness; the film of a photo replaces that of its camera."""
     surfaces = {
         owner: surface for owner, (surface, _) in surfaces_of(tables["film"]).items()

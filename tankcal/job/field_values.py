@@ -216,7 +216,7 @@ def read_value(field, raw, decimal=None):
     return reader(field, raw, decimal)
 
 
-def _refused(field, found, hint=""):
+def _refusal(field, found, hint=""):
     """`Refused` for a value that the field does not accept."""
     return Refused(
         message(
@@ -237,16 +237,16 @@ def _read_number(field, raw, decimal):
     elif isinstance(raw, int | float) and not isinstance(raw, bool | Percent):
         value = _float(raw)
     else:
-        raise _refused(field, _kind_of(raw), hint_of_number(raw))
+        raise _refusal(field, _kind_of(raw), hint_of_number(raw))
     if not math.isfinite(value):
-        raise _refused(field, shown(raw), message("not_infinite", ", not NaN or infinite"))
+        raise _refusal(field, shown(raw), message("not_infinite", ", not NaN or infinite"))
     if field.low == 0 < value < NEXT_TO_ZERO:
-        raise _refused(
+        raise _refusal(
             field, shown(raw), message("next_to_zero", ": 0, or a number further from 0")
         )
     if value > field.high or value < field.low or (field.above_low and value == field.low):
         hint = _other_unit(field, value)
-        raise _refused(field, shown(raw), hint)
+        raise _refusal(field, shown(raw), hint)
     return value
 
 
@@ -254,13 +254,13 @@ def _number_of_text(field, raw, decimal):
     """Number given as text, with the decimal mark of the file or an unambiguous other mark."""
     text = raw.strip(" \t")
     if len(text) > MAX_NAME:
-        raise _refused(field, shown(raw))
+        raise _refusal(field, shown(raw))
     plain = text.replace(",", ".") if decimal == "," else text
     is_number = NUMBER.fullmatch(plain) is not None
     if decimal in (None, IN_TOML):
         hint = hint_of_text(text, in_cell=decimal is None, name=field.name)
         found = message("the_text", "the text {found}", found=shown(raw))
-        raise _refused(field, found, hint)
+        raise _refusal(field, found, hint)
     if is_number and not (decimal == "," and "." in text):
         return float(plain)
     # A mark that differs from the declared mark is accepted if the number has one meaning.
@@ -276,7 +276,7 @@ def _number_of_text(field, raw, decimal):
         hint = message("with_decimal_comma", " with a decimal comma, as [csv] decimal says")
     else:
         hint = ""
-    raise _refused(field, shown(raw), hint)
+    raise _refusal(field, shown(raw), hint)
 
 
 def _float(raw):
@@ -320,11 +320,11 @@ def _read_text(field, raw, _decimal):
     if isinstance(raw, str):
         text = raw.replace("\u00a0", " ").strip()
     elif isinstance(raw, bool | dict | list):
-        raise _refused(field, _kind_of(raw))
+        raise _refusal(field, _kind_of(raw))
     elif isinstance(raw, float) and raw.is_integer() and abs(raw) < 1e15:
         text = str(int(raw))
     elif isinstance(raw, int) and abs(raw) >= 1e15:
-        raise _refused(field, shown(raw))
+        raise _refusal(field, shown(raw))
     elif isinstance(raw, datetime.datetime) and raw.time() == datetime.time(0):
         text = raw.date().isoformat()
     else:
@@ -345,7 +345,7 @@ def _read_text(field, raw, _decimal):
         pattern = patterns[field.kind]
         is_valid = len(text) <= MAX_NAME and pattern.fullmatch(text) is not None
     if not is_valid:
-        raise _refused(field, shown(text))
+        raise _refusal(field, shown(text))
     return meant(text, field.choices) or text
 
 
@@ -356,7 +356,7 @@ def _read_choice(field, raw, _decimal):
         text = meant(text, field.choices) or text
     if text not in field.choices:
         hint = nearest(text, field.choices) if isinstance(text, str) else ""
-        raise _refused(field, shown(raw), hint)
+        raise _refusal(field, shown(raw), hint)
     return text
 
 
@@ -368,7 +368,7 @@ def _read_flag(field, raw, _decimal):
         word = word if word in (YES, NO) else meant(word, (YES, NO))
         if word is not None:
             return word == YES
-    raise _refused(field, shown(raw))
+    raise _refusal(field, shown(raw))
 
 
 def _read_date(field, raw, _decimal):
@@ -382,7 +382,7 @@ def _read_date(field, raw, _decimal):
             return datetime.date.fromisoformat(text).isoformat()
     except ValueError:
         pass
-    raise _refused(field, shown(raw), hint_of_date(raw))
+    raise _refusal(field, shown(raw), hint_of_date(raw))
 
 
 def _read_time(field, raw, _decimal):
@@ -393,11 +393,11 @@ def _read_time(field, raw, _decimal):
         elif _ISO_TIME.fullmatch(text):
             moment = datetime.datetime.fromisoformat(text)
         else:
-            raise _refused(field, shown(raw), hint_of_date(raw))
+            raise _refusal(field, shown(raw), hint_of_date(raw))
     except ValueError as error:
         if isinstance(error, Refused):
             raise
-        raise _refused(field, shown(raw)) from error
+        raise _refusal(field, shown(raw)) from error
     return (moment.replace(tzinfo=None) - _EPOCH).total_seconds()
 
 
@@ -419,7 +419,7 @@ def _read_numbers(field, raw, decimal):
     try:
         return tuple(_read_number(field, part.strip() if is_text else part, mark) for part in parts)
     except Refused as refusal:
-        raise _refused(field, refusal.text.values["found"]) from None
+        raise _refusal(field, refusal.text.values["found"]) from None
 
 
 def _read_rows(field, raw, decimal):
@@ -432,15 +432,15 @@ def _read_rows(field, raw, decimal):
     elif isinstance(raw, list) and raw and not any(isinstance(row, list) for row in raw):
         rows = [raw]
     if not isinstance(rows, list) or not 0 < len(rows) <= MAX_ROWS:
-        raise _refused(field, shown(raw))
+        raise _refusal(field, shown(raw))
     if not all(isinstance(row, list) and len(row) == field.width for row in rows):
-        raise _refused(field, shown(raw))
+        raise _refusal(field, shown(raw))
     mark = IN_LIST if isinstance(raw, str) else decimal
     number = Field(field.name, "number", field.note, low=field.low, high=field.high)
     try:
         return tuple(tuple(_read_number(number, value, mark) for value in row) for row in rows)
     except Refused as refusal:
-        raise _refused(field, refusal.text.values["found"]) from None
+        raise _refusal(field, refusal.text.values["found"]) from None
 
 
 def _read_names(field, raw, _decimal):
@@ -459,7 +459,7 @@ def _read_names(field, raw, _decimal):
     names = []
     for part in parts:
         if is_blank(part) or isinstance(part, dict | list):
-            raise _refused(field, shown(raw))
+            raise _refusal(field, shown(raw))
         names.append(_read_text(text, part, None))
     return tuple(names)
 
@@ -477,16 +477,16 @@ def _read_dms(field, raw, _decimal):
         )
     match = _DMS.fullmatch(raw.replace("\u00a0", " ").strip())
     if match is None:
-        raise _refused(field, shown(raw))
+        raise _refusal(field, shown(raw))
     sign, degrees, minutes, seconds = match.groups()
     seconds = float((seconds or "0").replace(",", "."))  # a comma is a decimal mark below 60
     if int(minutes) >= 60 or seconds >= 60:
         hint = message("minutes_below_60", ", minutes and seconds below 60")
-        raise _refused(field, shown(raw), hint)
+        raise _refusal(field, shown(raw), hint)
     value = (int(degrees) * 3600 + int(minutes) * 60 + seconds) / 3600
     value = -value if sign == "-" else value
     if not field.low <= value <= field.high:
-        raise _refused(field, shown(raw))
+        raise _refusal(field, shown(raw))
     return value
 
 
@@ -498,7 +498,7 @@ def _read_ranges(field, raw, _decimal):
         pairs = [match.groups() for match in matches] if all(matches) else None
     is_list = isinstance(pairs, list) and 0 < len(pairs) <= MAX_LIST
     if not is_list or not all(isinstance(pair, list | tuple) and len(pair) == 2 for pair in pairs):
-        raise _refused(field, _kind_of(raw))
+        raise _refusal(field, _kind_of(raw))
     decimal = IN_LIST if isinstance(raw, str) else None
     number = Field(field.name, "number", field.note, low=0, high=200)
     return tuple(tuple(_read_number(number, end, decimal) for end in pair) for pair in pairs)

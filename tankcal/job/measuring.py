@@ -64,7 +64,7 @@ def make_measurements(values, tables, registers):
         ),
         nominal=_nominal(values),
         fiducials=fits,
-        correlated=_correlated(tables["correlated_readings"]),
+        correlated=_correlated_readings(tables["correlated_readings"]),
     )
 
 
@@ -248,7 +248,7 @@ def _stadia_readings(tables, registers):
     )
 
 
-def _correlated(table):
+def _correlated_readings(table):
     """`CorrelatedReadings`; None without rows."""
     if not _has_rows(table):
         return None

@@ -287,7 +287,7 @@ def find_rule(raw, name, log, key="table.rule"):
     section, _, entry = key.partition(".")
     place = (raw.settings_file, raw.settings[section][entry].row, key)
     if name in shipped_names():
-        return _for_key(shipped_rule(name), None, place, log)
+        return _check_rule_of_key(shipped_rule(name), None, place, log)
     path = raw.folder / name
     is_file_name = name.lower().endswith(_ENDING)
     if not (is_file_name and path.exists()):
@@ -297,10 +297,10 @@ def find_rule(raw, name, log, key="table.rule"):
         return None
     data = read_beside(raw.folder, name, log, MAX_SETTINGS_BYTES)
     rule = None if data is None else parse_rule(name, data, log)
-    return None if rule is None else _for_key(rule, fingerprint(name, data), place, log)
+    return None if rule is None else _check_rule_of_key(rule, fingerprint(name, data), place, log)
 
 
-def _for_key(rule, file, place, log):
+def _check_rule_of_key(rule, file, place, log):
     """(Rule, file) if the rule has the limits or the period that the key needs, else None."""
     if limits_one_table(rule) if place[-1] == _OF_TABLE else rule.periods:
         return rule, file

@@ -16,7 +16,7 @@ def tools_of(tables, tapes):
     }
 
 
-def gauged(table):
+def mean_plates(table):
     """{course: (mean plate, sd of the mean, mean paint or None)} of the gauge readings, m."""
     if table is None:
         return {}

@@ -90,7 +90,7 @@ def _test_setups(field, whole, names, suspect_from, wave_m, *tests):
     The worst set-up of each test is tested again by the other set-ups alone.
     """
     count, whole = len(names), whole + _waves(field.sites, wave_m)
-    by_all, by_others = tested(field, whole, count), {}
+    by_all, by_others = precision_and_pull(field, whole, count), {}
     tests_by_setup = [
         {name: test(names == name, *by_all) for name in dict.fromkeys(names.tolist())}
         for test in tests
@@ -102,13 +102,15 @@ def _test_setups(field, whole, names, suspect_from, wave_m, *tests):
         is_of_setup = names == suspect
         if suspect not in by_others:
             covariance = _covariance_by_others(field, whole - field.covariance_m2, is_of_setup)
-            by_others[suspect] = None if covariance is None else tested(field, covariance, count)
+            by_others[suspect] = (
+                None if covariance is None else precision_and_pull(field, covariance, count)
+            )
         if by_others[suspect] is not None:
             statistics[suspect] = test(is_of_setup, *by_others[suspect])
     return tests_by_setup
 
 
-def tested(field, covariance, count):
+def precision_and_pull(field, covariance, count):
     """P and P y of the first `count` readings of a field (see `field.blunders`)."""
     precision = restricted_precision(covariance, free_design(field.sites)[0])
     pull = precision @ (field.radius_m - field.radius_m.mean())
@@ -256,7 +258,7 @@ def judge_tangents(job, wall, touching):
     field = wall.field
     # A field of points alone has its noise section by section; the tests include all covariances.
     covariance = field.covariance_m2 + noise_of_wall(wall) - field.noise_m2
-    precision, pull = tested(field, covariance, sites)
+    precision, pull = precision_and_pull(field, covariance, sites)
     weight = np.maximum(np.diag(precision), 1e-300)
     # Leave-one-out discrepancy P y / P_ii, and w = P y / sqrt(P_ii), as in data snooping.
     departure[sight], w[sight] = pull / weight, pull / np.sqrt(weight)

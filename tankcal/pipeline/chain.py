@@ -15,7 +15,7 @@ from tankcal.pipeline.checks.survey import incomplete_certificate, open_question
 from tankcal.pipeline.overruling_effects import effect_of, warn_of_overrulings
 from tankcal.pipeline.result import Result
 from tankcal.pipeline.simulation import SIMULATING, gum_intervals, simulate_table
-from tankcal.pipeline.surveying import adjust_decided, find_survey, placed
+from tankcal.pipeline.surveying import adjust_decided, find_survey, locate_in_book
 from tankcal.pipeline.table import (
     check_table,
     compute_table,
@@ -178,7 +178,7 @@ def _collect_warnings(job, adjustment, sighting, survey, tabulation, supplemente
         *of_supplement,
         *incomplete_certificate(job),
     )
-    return placed(job, warnings)
+    return locate_in_book(job, warnings)
 
 
 def _base_warnings(job, adjustment):
@@ -195,7 +195,7 @@ def _problems_placed(job):
     try:
         yield
     except InputError as error:
-        raise InputError(placed(job, error.problems)) from error
+        raise InputError(locate_in_book(job, error.problems)) from error
 
 
 def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> "Adjustment":
@@ -242,7 +242,7 @@ def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> "Adju
     with _problems_placed(job):
         adjustment = adjust_decided(job, progress or (lambda text: None))
     warnings = (*adjustment.warnings, *_base_warnings(job, adjustment))
-    return replace(adjustment, warnings=placed(job, warnings))
+    return replace(adjustment, warnings=locate_in_book(job, warnings))
 
 
 def _require_job(job, name):

@@ -103,7 +103,9 @@ def effect_of(job, surveyed, volume_m3, level_m, progress):
             remaining = (*decisions[:i], *decisions[i + 1 :])
             without = _Attempt.of(job, remaining, level_m).volume_m3
             effects[i] = replace(effect, moved_m3=volume_m3 - without)
-    return Overrulings(tuple(effects), together, _changed(surveyed, by_search.found, decisions))
+    return Overrulings(
+        tuple(effects), together, _list_changes(surveyed, by_search.found, decisions)
+    )
 
 
 def _is_small(job):
@@ -184,7 +186,7 @@ def _states(surveyed):
     return list(zip(reason, wall.residuals_m.tolist(), w.tolist(), strict=True))
 
 
-def _changed(surveyed, by_search, decisions):
+def _list_changes(surveyed, by_search, decisions):
     """Undecided points, then readings, whose acceptance differs from that by the search alone."""
     if by_search is None:
         return ()
@@ -194,11 +196,13 @@ def _changed(surveyed, by_search, decisions):
         states = zip(surveyed.job.points.names, _states(surveyed), _states(by_search), strict=True)
         changed += [name for name, (now, *_), (former, *_) in states if now != former]
     if surveyed.adjustment is not None:
-        changed += sorted(_removed(surveyed.adjustment) ^ _removed(by_search.adjustment))
+        changed += sorted(
+            _removed_readings(surveyed.adjustment) ^ _removed_readings(by_search.adjustment)
+        )
     return tuple(name for name in changed if name not in decided)
 
 
-def _removed(adjustment):
+def _removed_readings(adjustment):
     """Rejected readings, named as in an `Overruling`."""
     return {
         f"{removed_reading.file.removesuffix('.csv')} {removed_reading.row}"

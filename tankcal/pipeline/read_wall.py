@@ -198,7 +198,7 @@ def readings_of_untold(job, measured, joints_m, zero_m):
     ]
 
 
-def off_centre(readings, field):
+def reduce_to_centre(readings, field):
     """Readings reduced to the centre of their level.
 
     A reading lacks (e x n)^2 / (2 rho) of the radius of a circle with eccentricity e.

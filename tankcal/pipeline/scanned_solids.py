@@ -243,7 +243,7 @@ def _readings(job, fit, chosen, covariance_m2):
         frame = np.vstack([fit.tangents, fit.direction])
         unknowns = np.array([0.0, 0.0, 0.0, 0.0, fit.radius_m])
         distance, by_unknowns, normal = cylinder_distances(frame)(unknowns, local)
-        angle, along = _on_cylinder(job, fit, means @ xyz)
+        angle, along = _cylinder_coordinates(job, fit, means @ xyz)
         places = OnCylinder(fit.radius_m, angle, along)
     else:
         unknowns = np.append(fit.centre_m, fit.radius_m)
@@ -258,7 +258,7 @@ def _readings(job, fit, chosen, covariance_m2):
     return _Readings(places, -(means @ by_unknowns), means @ distance, noise, by_points)
 
 
-def _on_cylinder(job, fit, xyz_m):
+def _cylinder_coordinates(job, fit, xyz_m):
     """Angles (n,) about the axis, 0 at the bottom, and positions from end A towards end B."""
     azimuth = job.horizontal.azimuth_rad
     sign = np.sign(fit.direction[:2] @ (np.sin(azimuth), np.cos(azimuth)))
@@ -281,7 +281,7 @@ def _nearest_to_foot(job, fit, solid, xyz_m):
     """
     if not isinstance(fit, FittedCylinder):
         return None
-    angle, along = _on_cylinder(job, fit, xyz_m)
+    angle, along = _cylinder_coordinates(job, fit, xyz_m)
     distance = np.hypot(fit.radius_m * angle, along - _dip_along(solid, along))
     return float(distance.min())
 
@@ -292,7 +292,7 @@ def _functionals(job, fitted, solid, places, levels_m, area_m2, chosen):
         volumes = cap_volumes(levels_m, area_m2, solid.diameter_m / 2)
         ends = np.array([(-1.0) ** DEGREES, np.ones(len(DEGREES))])
         return np.vstack([volumes, np.zeros((len(fitted.names), len(DEGREES))), ends])
-    along = _on_cylinder(job, fitted.fit, job.points.xyz_m[chosen])[1]
+    along = _cylinder_coordinates(job, fitted.fit, job.points.xyz_m[chosen])[1]
     dip = _dip_along(solid, along)
     begin = dip - solid.dip_from_a_m
     radius, cells, around = solid.width_m / 2, cells_along(begin, solid.length_m), cells_around()
@@ -357,7 +357,7 @@ class Scan:
 
     def is_within(self, places_m):
         """Whether positions (n, 3) lie inside the wall and between the ends of the survey."""
-        along = _along(self.fit, places_m)
+        along = _axial_positions(self.fit, places_m)
         low, high = self.reach_m
         return (offsets(self.fit, places_m) < 0) & (along > low) & (along < high)
 
@@ -426,7 +426,7 @@ def _refuse_scatter(job, fit, values, residuals):
     return noise
 
 
-def _along(fit, xyz_m):
+def _axial_positions(fit, xyz_m):
     """Positions (n,) along the axis of a cylinder, m; 0 for a sphere."""
     if isinstance(fit, FittedCylinder):
         return (xyz_m - fit.point_m) @ fit.direction
@@ -437,14 +437,14 @@ def _reach(fit, xyz_m):
     """Smallest and largest position along a cylinder, m; infinite for a sphere."""
     if not isinstance(fit, FittedCylinder):
         return -np.inf, np.inf
-    along = _along(fit, xyz_m)
+    along = _axial_positions(fit, xyz_m)
     return float(along.min()), float(along.max())
 
 
 def _fit_or_refuse(job, is_used):
     """`_fitted`, with InputError in place of SolutionError."""
     try:
-        return _fitted(job, is_used)
+        return _fit_points(job, is_used)
     except SolutionError as error:
         problem = Problem(
             origin_of(job.points),
@@ -464,7 +464,7 @@ def _covariance(points, index):
     return given_covariance(points, index).definite(LEAST_SD_M)
 
 
-def _fitted(job, is_used):
+def _fit_points(job, is_used):
     """Fit, names, values, their derivatives by the unknowns, and residuals of all points."""
     covariance, xyz = _covariance(job.points, np.flatnonzero(is_used)), job.points.xyz_m
     if job.sphere is not None:

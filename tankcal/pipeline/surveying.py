@@ -103,7 +103,7 @@ def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=N
     InputError, SolutionError
         As `chain.run`.
     """
-    adjustment, sights = _adjusted(job, progress) if job.has_network else None, {}
+    adjustment, sights = _adjust_survey(job, progress) if job.has_network else None, {}
     sighted = [method for method in given_methods(job) if method.is_sighted]
     if not sighted and adjustment is not None:
         from tankcal.survey import wall_points
@@ -120,7 +120,7 @@ def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=N
     except SolutionError as error:
         if adjustment is None or not adjustment.warnings:
             raise
-        texts = (warning.text for warning in placed(job, adjustment.warnings[:TOLD]))
+        texts = (warning.text for warning in locate_in_book(job, adjustment.warnings[:TOLD]))
         raise SolutionError(*error.args, *texts) from error
     if adjustment is not None and not sighted and is_surveyed_as(survey, "wall"):
         refuse_other_side(job, partial(is_within_wall, survey), adjustment)
@@ -133,14 +133,14 @@ def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=N
     return Surveyed(job, survey, adjustment, sights)
 
 
-def placed(job, problems):
+def locate_in_book(job, problems):
     """Problems located by workbook and sheet if the job is in a workbook."""
     if not job.source.endswith(".xlsx"):
         return tuple(problems)
     return tuple(in_book(problem, job.source) for problem in problems)
 
 
-def _adjusted(job, progress):
+def _adjust_survey(job, progress):
     """Adjusted survey of a job; SolutionError if the vertical or the scale is undetermined."""
     if job.points is not None and not job.points.from_adjustment:
         expected = message(

@@ -14,7 +14,7 @@ from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import message
 from tankcal.methods.base import accompanying_methods, given_methods, method_of
 from tankcal.pipeline.checks.size import check_reference, check_scan, check_size, check_wall
-from tankcal.pipeline.checks.survey import against_nominal, warn_of_undeclared
+from tankcal.pipeline.checks.survey import compare_with_nominal, warn_of_undeclared
 from tankcal.pipeline.tanks import body_of, critical_zone, zero_height
 from tankcal.solver.compiled import threads_for
 from tankcal.tank.body import Body
@@ -168,7 +168,7 @@ def check_table(job, survey, computed, sighting=None):
         *_check_survey(job, survey, computed.top_m),
         *_check_sights(job, survey, sighting),
         *warn_of_undeclared(undeclared_inputs(job, survey, computed.body)),
-        *against_nominal(job.tank, computed.table.volume_m3[-1]),
+        *compare_with_nominal(job.tank, computed.table.volume_m3[-1]),
     )
 
 
@@ -488,7 +488,7 @@ def verdict_of(job, body, table, intervals, simulation):
     """
     if job.rule is None:
         return None
-    printed = _printed(intervals, simulation)
+    printed = _print_U(intervals, simulation)
     return judge(
         job.rule,
         table,
@@ -502,7 +502,7 @@ def verdict_of(job, body, table, intervals, simulation):
     )
 
 
-def _printed(intervals, simulation):
+def _print_U(intervals, simulation):
     """`rules.PrintedU` of the rows and of the simulated deliveries."""
     if simulation is None:
         return PrintedU(intervals.U_m3)

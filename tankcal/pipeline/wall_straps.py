@@ -33,10 +33,10 @@ from tankcal.pipeline.read_wall import (
     names_of,
     noise_by_inputs,
     noise_of,
-    off_centre,
     readings_of_offsets,
     readings_of_straps,
     readings_of_untold,
+    reduce_to_centre,
     settle_readings,
     sites_of,
 )
@@ -210,7 +210,7 @@ class PointsOfWall:
     by_inputs: dict = field(default_factory=dict)
 
 
-def told_courses(job, seen):
+def courses_with_readings(job, seen):
     """Indices of the courses measured by points (the set `seen`), straps or reference lines."""
     place = {course.name: i for i, course in enumerate(job.courses)}
     strapped, of_lines = set(), set()
@@ -260,11 +260,11 @@ def join_readings(job, points, amplitudes, joints_m, *, is_known):
         insets = inner if inner.any() else insets_of(job, job.switches)
         offsets, of_offsets = _offsets_of(job.lines, names, insets, points.sites)
         readings, places = readings + offsets, places + of_offsets
-    measured = told_courses(job, set(points.sites.course.tolist()))
+    measured = courses_with_readings(job, set(points.sites.course.tolist()))
     former = readings_of_untold(job, measured, joints_m, zero)
     readings, places = readings + former, places + [-1] * len(former)
     readings = [
-        _on_surface(reading, inner[reading.course], job.survey.side) for reading in readings
+        _move_to_surface(reading, inner[reading.course], job.survey.side) for reading in readings
     ]
     if not is_known and len(np.unique(points.sites.course)) < len(names):
         amplitudes = None
@@ -310,7 +310,7 @@ def _joined_field(job, points, readings, amplitudes, heights):
     """
     n, k, nominal = len(points.radius_m), len(readings), job.tank.nominal_diameter_m / 2
     sites = sites_of(readings, *heights)
-    all_sites = points.unbound.padded(k).shared_by(_joined(points.sites, sites))
+    all_sites = points.unbound.padded(k).shared_by(_join_sites(points.sites, sites))
     is_bound = all_sites.shared is None
     if sites.shared is not None:  # unknowns of lines are last, as `ReadWall` expects
         line_columns = np.pad(sites.shared, ((n, 0), (0, 0)))
@@ -364,7 +364,7 @@ def _joined_field(job, points, readings, amplitudes, heights):
     field = field_of(accepted_at_first > 0)
     if np.any(sites.ring >= 0):
         # The centres of the rings are known only from a first solution.
-        readings = off_centre(readings, field)
+        readings = reduce_to_centre(readings, field)
         radius = np.append(points.radius_m, [reading.radius_m for reading in readings])
         field = field_of(accepted_at_first > 0)
     field, tested = settle_readings(field, field_of, (all_sites, radius, noise), may_go)
@@ -408,7 +408,7 @@ def _straps_of(job, read, taped, inner_m):
     )
 
 
-def _on_surface(reading, inner_m, side):
+def _move_to_surface(reading, inner_m, side):
     """Reading with its radius on the surface of the points: inside without plate and paint."""
     if side == "outside":
         return reading
@@ -420,7 +420,7 @@ def _on_surface(reading, inner_m, side):
     )
 
 
-def _joined(points, straps):
+def _join_sites(points, straps):
     """`Sites` of points, then of straps, without shared columns."""
     names = ("course", "ring", "zeta", "azimuth_rad", "leans")
     return Sites(
@@ -557,7 +557,7 @@ def adjust_readings(readings, sizes, amplitudes, *, snooping, bulge_scale=1.0):
     field = field_of(accepted)
     if np.any(sites.ring >= 0):
         # The centres of the rings are known only from a first solution.
-        readings = off_centre(readings, field)
+        readings = reduce_to_centre(readings, field)
         field = field_of(accepted)
     radius = np.array([reading.radius_m for reading in readings])
     field, tested = settle_readings(field, field_of, (sites, radius, noise), may_go)

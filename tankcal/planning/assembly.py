@@ -269,9 +269,9 @@ def setups_of(entry, number, shell, place):
                 name=names[at],
                 instrument=entry["instrument"],
                 xyz_m=xyz,
-                direction_sd_rad=_scaled(entry["s_direction_arcsec"], ARCSEC),
-                zenith_sd_rad=_scaled(entry["s_zenith_arcsec"], ARCSEC),
-                distance_sd_m=_scaled(entry["s_mm"], 1e-3),
+                direction_sd_rad=_scale(entry["s_direction_arcsec"], ARCSEC),
+                zenith_sd_rad=_scale(entry["s_zenith_arcsec"], ARCSEC),
+                distance_sd_m=_scale(entry["s_mm"], 1e-3),
                 sets=int(_value_or(entry["sets"], 1)),
                 sights=() if entry["sights"] is False else _neighbours(ring, names[at]),
                 place=place,
@@ -375,5 +375,5 @@ def _value_or(value, default):
     return default if value is None else value
 
 
-def _scaled(value, factor):
+def _scale(value, factor):
     return None if value is None else value * factor

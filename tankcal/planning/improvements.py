@@ -76,7 +76,7 @@ def cost_of(plan):
         Number of items times the unit costs of the plan; 0 if the plan states no costs.
     """
     if isinstance(plan, WallPlan):
-        return _priced(plan, wall_count(plan))
+        return _price(plan, wall_count(plan))
     count = {
         "photo_station": len(plan.stations),
         "photograph": len(plan.photos),
@@ -88,10 +88,10 @@ def cost_of(plan):
         "reading": sum(item.readings - 1 for item in (*plan.photos, *plan.ties, *plan.bases))
         + sum(setup.sets - 1 for setup in plan.setups),
     }
-    return _priced(plan, count)
+    return _price(plan, count)
 
 
-def _priced(plan, count):
+def _price(plan, count):
     return float(sum(plan.costs.get(name, 0.0) * number for name, number in count.items()))
 
 

@@ -237,7 +237,7 @@ def page_blocks(paper):
         blocks.masthead(title, paper.word("texts.steps", steps=steps)),
         blocks.key_values(_counts(paper)),
         *_false_alarms(paper),
-        *_gone(paper),
+        *_missing_jobs(paper),
         *_rows(paper),
     ]
 
@@ -267,7 +267,7 @@ def _counts(paper):
     return items
 
 
-def _gone(paper):
+def _missing_jobs(paper):
     """Return a paragraph with the jobs of the last batch that this batch does not contain."""
     gone = paper.summary["gone"]
     if not gone:

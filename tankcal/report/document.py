@@ -118,7 +118,7 @@ def _block_of_output(output, place):
         return blocks.code(output["text"].rstrip("\n")).data if output["text"].strip() else None
     data = output.get("data", {})
     if blocks.MIME in data:
-        return _checked(data[blocks.MIME], place)
+        return _check(data[blocks.MIME], place)
     if "image/svg+xml" in data:
         return _picture(data, "svg", data["image/svg+xml"])
     if "image/png" in data:
@@ -159,7 +159,7 @@ _KEYS = {  # keys that a block of each kind must have
 }
 
 
-def _checked(data, place):
+def _check(data, place):
     """Return a valid block; raise TankcalError for a block of a later version."""
     kind = data.get("kind") if isinstance(data, dict) else None
     if kind not in _KEYS:

@@ -254,12 +254,12 @@ def load(path):
     """Read the Letterhead of a TOML file; raise InputError that lists all problems."""
     path, log = Path(path), Log()
     data = read_bytes(path, log, MAX_SETTINGS_BYTES)
-    letterhead = None if data is None else _parsed(path, data, log)
+    letterhead = None if data is None else _parse(path, data, log)
     log.stop_if_problems()
     return letterhead
 
 
-def _parsed(path, data, log):
+def _parse(path, data, log):
     """Return the Letterhead of TOML bytes, or None; problems go to the log."""
     settings, rows = read_toml(path.name, data, log)
     if settings is None:

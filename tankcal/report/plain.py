@@ -268,11 +268,11 @@ class PlainPaper:
 def words_with_part(words, part):
     """Return the words, in which the groups of `part` override groups of equal names."""
     groups = words[part]
-    merged = {name: _merged(words.get(name, {}), group) for name, group in groups.items()}
+    merged = {name: _merge(words.get(name, {}), group) for name, group in groups.items()}
     return {name: group for name, group in words.items() if name != part} | merged
 
 
-def _merged(common, part_words):
+def _merge(common, part_words):
     """Return the words of a group, overridden by the words of its part."""
     if any(isinstance(word, dict) for word in part_words.values()):
         return common | {name: common.get(name, {}) | group for name, group in part_words.items()}

@@ -69,7 +69,7 @@ def _upright(paper):
     _gauge(ax, paper, _dip_x(record), _BOTTOM + height, _zero_y(record, per_m), below)
     _measure(ax, _LEFT - 0.35, _BOTTOM, top, _dimension_label(paper, "shell", courses[-1]["top_m"]))
     nominal = _dimension_label(paper, "diameter", tank["nominal_diameter_m"])
-    _across(ax, nominal, below=below)
+    _draw_dimension(ax, nominal, below=below)
     return figure
 
 
@@ -201,7 +201,7 @@ def _lying(paper):
     diameter_label = _dimension_label(paper, "inside_diameter", sizes["section_height"])
     _measure(ax, _LEFT - 0.35, _BOTTOM, _BOTTOM + height, diameter_label)
     length_label = _dimension_label(paper, "length", sizes["cylinder_length"])
-    _across(ax, length_label, _LEFT + end, _LEFT + length - end)
+    _draw_dimension(ax, length_label, _LEFT + end, _LEFT + length - end)
     return figure
 
 
@@ -229,7 +229,7 @@ def _measure(ax, x, low, high, label):
     _text(ax, x - 0.08, (low + high) / 2, label, "right")
 
 
-def _across(ax, label, left=_LEFT, right=_RIGHT, below=0.0):
+def _draw_dimension(ax, label, left=_LEFT, right=_RIGHT, below=0.0):
     """Draw a horizontal dimension below the tank."""
     y = _BOTTOM - below - 0.24
     ax.annotate("", (right, y), (left, y), arrowprops=_ARROW)

@@ -44,7 +44,7 @@ def write_job(job, directory, language=DEFAULT):
     with replace_folder(directory) as folder:
         words = load_words(language)
         for name, text in job.texts.items():
-            text = _translated(text, job.words, words)
+            text = _translate(text, job.words, words)
             if name == SETTINGS and language != DEFAULT:
                 text = text.replace("[table]\n", f'[table]\nlanguage = "{language}"\n', 1)
             (folder / name).write_text(text, encoding="utf-8")
@@ -57,7 +57,7 @@ def write_job(job, directory, language=DEFAULT):
     return names
 
 
-def _translated(text, messages, words):
+def _translate(text, messages, words):
     """Translate the messages in the text of a file."""
     for message in messages:
         english, translation = (json.dumps(part, ensure_ascii=False)[1:-1] for part in

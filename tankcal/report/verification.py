@@ -156,7 +156,7 @@ def _folder(verification, folder, job, callbacks):
     elif not verify_saved_folder(verification, folder, callbacks, manifest, job):
         text = message("verify_no_record", "is missing; expected the record of the results")
         raise InputError(Problem(RECORD, text))
-    _listed(verification, folder, manifest)
+    _compare_manifest(verification, folder, manifest)
     # The record states the hash of its long tables.
     proved = {*verification.made_again, RECORD, TABLES}
     verification.by_hash = [name for name in files_below(folder) if name not in proved]
@@ -215,7 +215,7 @@ def _numbers(verification, record, job, folder, callbacks):
     compute_numbers_again(verification, record, job, folder=folder, step=step, part=part)
 
 
-def _listed(verification, folder, manifest):
+def _compare_manifest(verification, folder, manifest):
     """Report missing, extra and altered files according to SHA256SUMS."""
     if manifest is None:
         text = message(

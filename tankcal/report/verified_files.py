@@ -182,11 +182,11 @@ def compare_certificate(verification, name, content, record):
                     file=entry["file"],
                 ),
             )
-    if record["tankcal"] == tankcal.__version__ and _written_by(root) == tankcal.__version__:
+    if record["tankcal"] == tankcal.__version__ and _version_of(root) == tankcal.__version__:
         _compare_again(verification, name, content, record, root)
 
 
-def _written_by(root):
+def _version_of(root):
     """Return the version of tankcal in a certificate, or None."""
     release = root.findtext(f".//{_DCC}dccSoftware/{_DCC}software/{_DCC}release")
     return release and release.removeprefix("v")

@@ -32,16 +32,16 @@ class BeamPoints:
     points : Points
     incidence_rad : ndarray, shape (n,)
         Angle between the beam and the normal of the wall.
-    told_m : dict
+    estimated_m : dict
         {scanner: offset estimated from the wall and already subtracted, m}.
     """
 
     points: Points
     incidence_rad: np.ndarray
-    told_m: dict = field(default_factory=dict)
+    estimated_m: dict = field(default_factory=dict)
 
 
-def points_of_beams(xyz_m, sd_m, scan, normal, registration, tools, *, file="", told_m=None):
+def points_of_beams(xyz_m, sd_m, scan, normal, registration, tools, *, file="", estimated_m=None):
     """Convert means of a cloud to points of the wall.
 
     Parameters
@@ -60,7 +60,7 @@ def points_of_beams(xyz_m, sd_m, scan, normal, registration, tools, *, file="", 
         {scanner: (RangingInstrument, whether its offset is assumed, whether its scale is assumed)}.
     file : str
         Source of the points in messages.
-    told_m : dict, optional
+    estimated_m : dict, optional
         {scanner: offset estimated from the wall, m}.
 
     Returns
@@ -69,7 +69,7 @@ def points_of_beams(xyz_m, sd_m, scan, normal, registration, tools, *, file="", 
         Points with their full covariance. An offset without any estimate is excluded from the
         covariance and listed in `unbound`.
     """
-    shared = shared_by_beams(xyz_m, scan, normal, registration, tools, told_m=told_m)
+    shared = shared_by_beams(xyz_m, scan, normal, registration, tools, estimated_m=estimated_m)
     n = len(xyz_m)
     # Covariance = sum of column column' over the shared causes + the independent variances.
     columns = np.column_stack([cause.column_m for cause in shared.causes] or [np.zeros(3 * n)])
@@ -90,7 +90,7 @@ def points_of_beams(xyz_m, sd_m, scan, normal, registration, tools, *, file="", 
         unbound=shared.unbound,
         file=file,
     )
-    return BeamPoints(points, np.arccos(shared.cosine), told_m or {})
+    return BeamPoints(points, np.arccos(shared.cosine), estimated_m or {})
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class Shared:
     cosine: np.ndarray
 
 
-def shared_by_beams(xyz_m, scan, normal, registration, tools, *, told_m=None):
+def shared_by_beams(xyz_m, scan, normal, registration, tools, *, estimated_m=None):
     """Compute the shared causes of places in scans.
 
     Parameters
@@ -127,20 +127,20 @@ def shared_by_beams(xyz_m, scan, normal, registration, tools, *, told_m=None):
     registration : Registration
     tools : dict
         {scanner: (RangingInstrument, whether its offset is assumed, whether its scale is assumed)}.
-    told_m : dict, optional
+    estimated_m : dict, optional
         {scanner: offset estimated from the wall, m}.
 
     Returns
     -------
     Shared
     """
-    told_m = told_m or {}
+    estimated_m = estimated_m or {}
     n, s = len(xyz_m), len(registration.scans)
     tool = tool_of(registration)[scan]
     beam = xyz_m - registration.place_m[scan]
     distance = np.maximum(np.linalg.norm(beam, axis=1), 1e-9)
     ray = beam / distance[:, None]
-    offset_m = np.array([told_m.get(name, 0.0) for name in registration.scanners])
+    offset_m = np.array([estimated_m.get(name, 0.0) for name in registration.scanners])
     # Invert reading = (1 + scale) true + offset, with the estimated offset and scale.
     distance = (distance - offset_m[tool]) / (1 + registration.scale[tool])
     beam = distance[:, None] * ray

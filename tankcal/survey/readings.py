@@ -376,7 +376,7 @@ def average_repeated(observations, label, warnings, *, name_of=None, apart=False
         return observations
     angle = observations.unit == "rad"
     means = average_readings(label, observations.value, observations.sd, angle=angle)
-    warnings += _scatter_warnings(means, observations.trace, name_of or _joined)
+    warnings += _scatter_warnings(means, observations.trace, name_of or _join)
     torn = contradictory_labels(label, means) if apart else label
     if torn is not label:
         means = average_readings(torn, observations.value, observations.sd, angle=angle)
@@ -386,7 +386,7 @@ def average_repeated(observations, label, warnings, *, name_of=None, apart=False
     return replace(first, value=value, sd=sd, trace=trace)
 
 
-def _joined(ids, element):
+def _join(ids, element):
     return "-".join(ids)
 
 

@@ -149,9 +149,9 @@ class Sighting:
         Whether the set-up is within that wall.
     normal : ndarray, shape (n, 3)
         Outward normal of that wall.
-    told_m : dict
+    estimated_m : dict
         {instrument: offset estimated from the wall and already subtracted, m}.
-    told : tuple of ToldCause
+    estimates : tuple of EstimatedCause
         Offsets and scales estimated from the wall; (): not estimated yet.
     by_poses : ndarray, shape (3 n, u)
         Derivative of the points by the unknowns of `Poses.covariance`.
@@ -165,20 +165,20 @@ class Sighting:
     incidence_rad: np.ndarray
     is_inside: np.ndarray
     normal: np.ndarray
-    told_m: dict = field(default_factory=dict)
-    told: tuple = ()
+    estimated_m: dict = field(default_factory=dict)
+    estimates: tuple = ()
     by_poses: np.ndarray | None = None
     beside: "Beside | None" = None
 
 
-def sight(hits, poses, told_m=None, incidence=None):
+def sight(hits, poses, estimated_m=None, incidence=None):
     """Compute the points of hits from known poses.
 
     Parameters
     ----------
     hits : WallHits
     poses : Poses
-    told_m : dict, optional
+    estimated_m : dict, optional
         {instrument: offset estimated from the wall, m}.
     incidence : callable, optional
         Function with the parameters and results of `incidence_in_plan`, for a wall that is not an
@@ -190,8 +190,8 @@ def sight(hits, poses, told_m=None, incidence=None):
         Its points have their full covariance. Offsets without estimate and poses tied by the wall
         only are excluded from it and listed in `unbound` of the points.
     """
-    told_m = told_m or {}
-    offsets_m = np.array([told_m.get(name, 0.0) for name in poses.instruments])
+    estimated_m = estimated_m or {}
+    offsets_m = np.array([estimated_m.get(name, 0.0) for name in poses.instruments])
     poses = replace(poses, offset_m=poses.offset_m + offsets_m)
     pose = poses.place_of(hits)
     tool = np.array([poses.instruments.index(name) for name in hits.instrument])
@@ -244,7 +244,7 @@ def sight(hits, poses, told_m=None, incidence=None):
         file=hits.file,
     )
     return Sighting(
-        points, poses, pose, np.arccos(cosine), inside, normal, told_m, by_poses=jacobian
+        points, poses, pose, np.arccos(cosine), inside, normal, estimated_m, by_poses=jacobian
     )
 
 

@@ -295,7 +295,7 @@ def reduce_strap(strap, tape, obstructions, shell_temperature_c, strapping, diam
     steps["rise"] = -sum(item.excess(diameter_m) for item in obstructions)
     sag = sag_of(strap, tape, obstructions)
     steps["sag"] = 0.0 - sag.excess_m
-    unlevel = _out_of_level(strapping, diameter_m)
+    unlevel = _level_excess_bound(strapping, diameter_m)
     steps["out_of_level"] = -unlevel
     # A tape at shell temperature shares the uncertainty of that temperature.
     per_k = length * tape.expansion_per_k if tape.temperature_c is not None else 0.0
@@ -329,7 +329,7 @@ def reduce_strap(strap, tape, obstructions, shell_temperature_c, strapping, diam
     )
 
 
-def _out_of_level(strapping, diameter_m):
+def _level_excess_bound(strapping, diameter_m):
     """Half the bound of the excess of a tape out of level, m: the excess lies between 0 and the
     bound.
 

@@ -35,7 +35,7 @@ from tankcal.geometry.field.likelihood import Misfit
 from tankcal.geometry.field.sites import Sites, cells_of, sites_of_cells
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall.finding import find_wall
-from tankcal.pipeline.wall_straps import _joined
+from tankcal.pipeline.wall_straps import _join_sites
 
 FULL_TURN, RADIUS_M = 2 * np.pi, 6.5
 
@@ -142,7 +142,7 @@ def test_limbs_tell_no_size_by_another():
         assert found.variances_m2[:2] == pytest.approx(before.variances_m2[:2], rel=1e-3)
     assert sites.take(sites.course > 0).smoothed
     assert sites_of_cells(sites, cells_of(sites, np.full(len(sites), 1e-6), RADIUS_M)).smoothed
-    assert _joined(sites, replace(sites, smoothed=False)).smoothed
+    assert _join_sites(sites, replace(sites, smoothed=False)).smoothed
 
 
 def test_a_plate_bulges_between_a_parabola_and_a_bell():
@@ -544,11 +544,15 @@ def test_seams_hide_from_points_of_cells_beside_straps_as_from_points():
     cells = sites_of_cells(points, cells_of(points, np.full(2600, 1e-6), 7.5, 400))
     around = np.full(2, np.nan)
     straps = Sites(np.arange(2), np.full(2, -1), np.zeros(2), around, np.zeros(2, bool))
-    course, azimuth = _joined(cells, straps).seen
+    course, azimuth = _join_sites(cells, straps).seen
     found = hidden_seams_m(azimuth[course == 0], 7.5)
     assert found == pytest.approx(hidden_seams_m(columns, 7.5))
     assert hidden_seams_m(cells.azimuth_rad[cells.course == 0], 7.5) > 2 * found
-    upper = _joined(cells, straps).take(np.flatnonzero(_joined(cells, straps).course == 1)).points
+    upper = (
+        _join_sites(cells, straps)
+        .take(np.flatnonzero(_join_sites(cells, straps).course == 1))
+        .points
+    )
     assert np.array_equal(np.unique(upper[0]), [0])
     assert hidden_seams_m(upper[1], 7.5) == pytest.approx(found)
 

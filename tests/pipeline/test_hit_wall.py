@@ -24,7 +24,7 @@ from page_figures import figures_of
 import tankcal
 from tankcal.cli.running import describe_rejected
 from tankcal.pipeline.wall.finding import take_points
-from tankcal.pipeline.wall.shared_unknowns import told_causes
+from tankcal.pipeline.wall.shared_unknowns import estimate_causes
 from tankcal.survey import adjust_survey, wall_points
 from tankcal.survey.sighting import sight
 
@@ -317,10 +317,10 @@ def test_straps_tell_an_unknown_offset(tmp_path):
     del parts.registers["instruments"]["TS"]["u_offset_mm"]
     result = run(tmp_path, parts)
     assert result.table.volume_m3[-1] == pytest.approx(volume_of(oval), rel=2e-5)
-    (told,) = told_causes(result.job, result.wall)
+    (told,) = estimate_causes(result.job, result.wall)
     assert told.u_before == np.inf
     assert abs(told.value) < 2e-6  # it was taken off, and the wall found once more
-    assert result.sighting.told_m["TS"] == pytest.approx(0.002, abs=5e-5)
+    assert result.sighting.estimated_m["TS"] == pytest.approx(0.002, abs=5e-5)
     assert -0.5 < told.correlation < 0
     assert np.abs(result.straps.w).max() < 1
 
@@ -345,7 +345,7 @@ def test_straps_and_hits_are_one_least_squares_solution(tmp_path):
     dense = np.linalg.solve(normal, bare.T @ weight @ y)
     means = np.array([field.radius_m[field.sites.course == c].mean() for c in range(4)])
     np.testing.assert_allclose(field._solution[0][starts] + means, dense[starts], atol=1e-9)
-    (told,) = told_causes(result.job, wall)[:1]
+    (told,) = estimate_causes(result.job, wall)[:1]
     assert told.value == pytest.approx(offset.u / 1000 * dense[-1], abs=1e-9)
     sd = offset.u / 1000 * np.sqrt(np.linalg.inv(normal)[-1, -1])
     assert told.u_after == pytest.approx(sd, abs=1e-9)
@@ -704,7 +704,7 @@ def test_one_offset_inside_and_outside(tmp_path, side):
     del parts.registers["instruments"]["TS"]["u_offset_mm"]
     result = run(tmp_path, parts)
     assert result.table.volume_m3[-1] == pytest.approx(volume_of(oval), rel=1e-5)
-    assert result.sighting.told_m["TS"] == pytest.approx(0.002, abs=1e-5)
+    assert result.sighting.estimated_m["TS"] == pytest.approx(0.002, abs=1e-5)
     noisy = both_parts(seed=6, offset_m=0.002)
     del noisy.registers["instruments"]["TS"]["u_offset_mm"]
     found = run(tmp_path / "noisy", noisy)

@@ -5,7 +5,7 @@ import pytest
 from job_builder import S_1, strapped_parts
 from test_strapped_wall import result_of, straps_with
 
-from tankcal.methods.strapping.warnings import _of_copies
+from tankcal.methods.strapping.warnings import _find_copies
 from tankcal.survey.strapping import Strap
 
 
@@ -141,10 +141,10 @@ def test_repeats_are_equal_by_chance_now_and_then(figure):
     """Simulation: books of a sound crew, to 0.1 mm and to 1 mm, are told in less than 2 %."""
     rng = np.random.default_rng(3)
     for digits in (4, 3):
-        share = np.mean([bool(list(_of_copies(book(rng, digits=digits)))) for _ in range(400)])
+        share = np.mean([bool(list(_find_copies(book(rng, digits=digits)))) for _ in range(400)])
         figure(f"books told of copied repeats, {digits} decimals", f"{share:.3f}")
         assert share < 0.02 + 3 * np.sqrt(0.02 * 0.98 / 400)
-        assert len(list(_of_copies(book(rng, copied=12, digits=digits)))) >= 12
+        assert len(list(_find_copies(book(rng, copied=12, digits=digits)))) >= 12
 
 
 def courses_read_once(rng, digits, copied=False):
@@ -166,7 +166,7 @@ def test_circumferences_of_one_course_are_equal_by_chance_now_and_then(figure):
     rng = np.random.default_rng(4)
     for digits in (4, 3):
         books = [courses_read_once(rng, digits) for _ in range(400)]
-        share = np.mean([bool(list(_of_copies(one))) for one in books])
+        share = np.mean([bool(list(_find_copies(one))) for one in books])
         figure(f"books told of copied circumferences, {digits} decimals", f"{share:.3f}")
         assert share < 0.02 + 3 * np.sqrt(0.02 * 0.98 / 400)
-        assert len(list(_of_copies(courses_read_once(rng, digits, copied=True)))) >= 6
+        assert len(list(_find_copies(courses_read_once(rng, digits, copied=True)))) >= 6

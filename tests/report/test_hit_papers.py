@@ -34,8 +34,12 @@ def test_the_record_has_set_ups_rings_and_what_is_shared(result, record):
     offset = next(one for one in record["hits"]["shared"] if one["what"] == "instrument_offset")
     assert offset["u_before"] is None
     assert offset["value"] == pytest.approx(-2.1, abs=2 * offset["u_after"])
-    first = 1000 * result.sighting.told_m["TS-4"]  # taken off; the wall without it tells the rest
-    (rest,) = (1000 * one.value for one in result.sighting.told if one.what == "instrument_offset")
+    first = (
+        1000 * result.sighting.estimated_m["TS-4"]
+    )  # taken off; the wall without it tells the rest
+    (rest,) = (
+        1000 * one.value for one in result.sighting.estimates if one.what == "instrument_offset"
+    )
     assert offset["value"] == pytest.approx(first + rest, abs=1e-9)
     assert abs(rest) < 0.05 * offset["u_after"]
     assert -1 < offset["correlation"] < 0

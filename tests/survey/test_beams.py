@@ -125,7 +125,7 @@ def test_a_free_offset_is_unbound_and_what_is_told_is_taken_off():
     plain = points_of_beams(xyz, np.full(14, 1e-3), scan, normal, registration, given)
     assert [one.what for one in plain.points.unbound] == ["instrument_offset"]
     told = points_of_beams(
-        xyz, np.full(14, 1e-3), scan, normal, registration, given, told_m={"S": 0.004}
+        xyz, np.full(14, 1e-3), scan, normal, registration, given, estimated_m={"S": 0.004}
     )
     moved = told.points.xyz_m - plain.points.xyz_m
     np.testing.assert_allclose(moved.ravel(), 0.004 * plain.points.unbound[0].column_m, atol=1e-12)

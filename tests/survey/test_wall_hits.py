@@ -18,7 +18,7 @@ from tankcal.geometry.field.components import COMPONENTS
 from tankcal.geometry.field.estimate import WallField
 from tankcal.geometry.field.sites import Sites
 from tankcal.methods.hits.warnings import drifts_of, repeats_of
-from tankcal.pipeline.wall.shared_unknowns import told_causes
+from tankcal.pipeline.wall.shared_unknowns import estimate_causes
 from tankcal.survey.measurements import Setup
 from tankcal.survey.points import Points
 from tankcal.survey.results import Cause
@@ -172,7 +172,7 @@ def test_offset_and_radius_of_the_field_page(
         read=True,
         radii_by_points=scipy.sparse.csr_array(radial),
     )
-    found, _ = told_causes(SimpleNamespace(points=points), wall)
+    found, _ = estimate_causes(SimpleNamespace(points=points), wall)
     assert 1000 * found.u_after == pytest.approx(u_offset, abs=6e-4)
     assert found.correlation == pytest.approx(r, abs=1e-3)
     variance = field.means.weights @ field.noise_m2 @ field.means.weights.T

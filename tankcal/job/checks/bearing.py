@@ -51,27 +51,27 @@ def useless_inputs(values, tables, kind):
         for name, known in INPUTS.items()
         if kind not in known.kinds
     }
-    rules = of_temperature(values, values["survey"]["shell_temperature_c"]) | {
-        "deadwood": _of_deadwood(values, tables["deadwood"])
+    rules = explain_temperature(values, values["survey"]["shell_temperature_c"]) | {
+        "deadwood": _explain_deadwood(values, tables["deadwood"])
     }
     if kind == "vertical":
-        rules |= _of_vertical(values, tables)
+        rules |= _explain_vertical(values, tables)
     elif kind == "horizontal":
-        rules |= _of_horizontal(values, tables)
+        rules |= _explain_horizontal(values, tables)
     elif kind == "sphere":
-        rules |= _of_wall(values["sphere"], values, has_wall_points(tables))
-        rules |= _of_sphere(values)
+        rules |= _explain_wall(values["sphere"], values, has_wall_points(tables))
+        rules |= _explain_sphere(values)
     for method in methods_for(kind):
         if method.is_given(tables):
             rules |= method.useless_inputs(values, tables)
     return others | {name: why for name, why in rules.items() if why}
 
 
-def _switched_off(correction):
+def _explain_switch(correction):
     return message("switched_off", "corrections.{correction} is false", correction=correction)
 
 
-def of_temperature(values, shell_temperature_c):
+def explain_temperature(values, shell_temperature_c):
     """{input: reason}, with "" for an input that has an effect.
 
     All functions below return this form.
@@ -85,9 +85,9 @@ def of_temperature(values, shell_temperature_c):
     return {"shell_temperature": why, "expansion": why}
 
 
-def _of_deadwood(values, deadwood):
+def _explain_deadwood(values, deadwood):
     if values["corrections"]["deadwood"] is False:
-        return _switched_off("deadwood")
+        return _explain_switch("deadwood")
     is_there = deadwood is not None and any(
         volume != 0 and u is None
         for volume, u in zip(deadwood.of("volume_m3"), deadwood.of("u_m3"), strict=True)
@@ -99,7 +99,7 @@ def _of_deadwood(values, deadwood):
     )
 
 
-def _of_vertical(values, tables):
+def _explain_vertical(values, tables):
     survey, switches = values["survey"], values["corrections"]
     head = values["table"]["liquid_density_kg_m3"] and switches["head"] is not False
     no_liquid = not survey["liquid_level_m"] or switches["head"] is False
@@ -109,19 +109,19 @@ def _of_vertical(values, tables):
         "expected only with points: tapes and instruments of wall hits have their own in"
         " instruments.toml",
     )
-    return _of_plates(values, tables, head or not no_liquid) | {
+    return _explain_plates(values, tables, head or not no_liquid) | {
         "offset": of_points if _has_own_offset(tables) else "",
-        "course_heights": _of_heights(tables["courses"], values),
+        "course_heights": _explain_course_heights(tables["courses"], values),
         "youngs_modulus": NO_HEAD if not head and no_liquid else "",
         "liquid_density": "" if head else NO_HEAD,
         "survey_level": NO_SURVEY_LIQUID if no_liquid else "",
         "survey_density": NO_SURVEY_LIQUID if no_liquid else "",
-        "bottom": _of_bottom(values, tables["bottom"]),
-        **_of_heads(values, tables["bottom"]),
+        "bottom": _explain_bottom(values, tables["bottom"]),
+        **_explain_heads(values, tables["bottom"]),
         "roof_mass": message("no_floating_roof", "expected only with a floating roof: [roof]")
         if no_roof
         else "",
-        "tilt": _switched_off("tilt") if switches["tilt"] is False else "",
+        "tilt": _explain_switch("tilt") if switches["tilt"] is False else "",
     }
 
 
@@ -134,9 +134,9 @@ def _has_own_offset(tables):
     )
 
 
-def _of_bottom(values, bottom):
+def _explain_bottom(values, bottom):
     if values["corrections"]["bottom"] is False:
-        return _switched_off("bottom")
+        return _explain_switch("bottom")
     return {
         "liquid": message("u_in_bottom", "expected u_m3 in bottom.csv instead"),
         "flat": message(
@@ -147,7 +147,7 @@ def _of_bottom(values, bottom):
     }.get(bottom_form(values, bottom), "")
 
 
-def _of_heads(values, bottom):
+def _explain_heads(values, bottom):
     """Reasons for the dimensions of a shaped bottom and of a head on top."""
     form, top = bottom_form(values, bottom), values["top"]["form"]
     is_off = {part: values["corrections"][part] is False for part in ("bottom", "top")}
@@ -159,7 +159,7 @@ def _of_heads(values, bottom):
     has_shaped_bottom = form in SHAPED and not is_off["bottom"]
     has_head = top is not None and not is_off["top"]
     return {
-        **_of_radii_of(heads),
+        **_explain_head_radii(heads),
         "bottom_depth": ""
         if has_shaped_bottom
         else message("no_shaped_bottom", "expected only with a bottom that is a cone or a head"),
@@ -169,7 +169,7 @@ def _of_heads(values, bottom):
     }
 
 
-def _of_plates(values, tables, is_loaded, table_name="courses"):
+def _explain_plates(values, tables, is_loaded, table_name="courses"):
     """Reasons for the thickness of plates and paint.
 
     Plates have an effect if they are subtracted or loaded; paint, if it is subtracted. A tape lies
@@ -195,31 +195,31 @@ def _of_plates(values, tables, is_loaded, table_name="courses"):
     return why
 
 
-def _of_heights(courses, values):
+def _explain_course_heights(courses, values):
     has_head = values["top"]["form"] is not None and values["corrections"]["top"] is not False
     single = not has_head and courses is not None and len(courses.rows) + courses.skipped == 1
     return message("only_one_course", "expected only with two courses or more") if single else ""
 
 
-def _of_horizontal(values, tables):
+def _explain_horizontal(values, tables):
     given, no_tilt = values["horizontal"], values["corrections"]["tilt"] is False
     wall = wall_of(tables)
     has_points = wall == "points"
     leans = has_points or (given["tilt_mm_per_m"] and not no_tilt)
     all_flat = given["end_a"] == given["end_b"] == "flat"
-    switched_off = _switched_off("tilt") if no_tilt else ""
-    sizes = _of_rings(values, tables) if wall == "straps" else _of_one_cylinder()
+    switched_off = _explain_switch("tilt") if no_tilt else ""
+    sizes = _explain_rings(values, tables) if wall == "straps" else _explain_single_cylinder()
     ends = [{key: given[f"end_{end}_{key}"] for key in SIZES_OF_END} for end in "ab"]
     return (
-        _of_wall(given, values, has_points)
+        _explain_wall(given, values, has_points)
         | sizes
         | {
             "end_depth": message("ends_are_flat", "expected only with an end that is not flat")
             if all_flat
             else "",
-            **_of_radii_of(ends),
-            **dict.fromkeys(("tube_angle", "tube_offset"), _of_tube(given, wall)),
-            "tilt": _from_points(has_points) or switched_off,
+            **_explain_head_radii(ends),
+            **dict.fromkeys(("tube_angle", "tube_offset"), _explain_tube(given, wall)),
+            "tilt": _explain_measured(has_points) or switched_off,
             "dip_position": ""
             if leans
             else message("does_not_lean", "expected only for a tank that leans"),
@@ -227,17 +227,17 @@ def _of_horizontal(values, tables):
     )
 
 
-def _of_one_cylinder():
+def _explain_single_cylinder():
     """Reasons for inputs of strapped rings, for a tank without rings."""
     no_rings = message("no_rings", "expected only with the rings of rings.csv")
     return dict.fromkeys(("paint", "ring_lengths", "ring_axes"), no_rings)
 
 
-def _of_rings(values, tables):
+def _explain_rings(values, tables):
     """Reasons for the inputs of a cylinder with strapped rings."""
     by_tape = message("by_tape", "its uncertainty comes from the readings of the tape")
     is_single = "rings" in tables and has_rows(tables["rings"]) and len(tables["rings"].rows) == 1
-    why = _of_plates(values, tables, False, "rings")
+    why = _explain_plates(values, tables, False, "rings")
     return why | {
         "diameter": by_tape,
         "offset": by_tape,
@@ -249,7 +249,7 @@ def _of_rings(values, tables):
     }
 
 
-def _of_radii_of(heads):
+def _explain_head_radii(heads):
     return {
         name: "" if any(_gives(name, head) for head in heads) else NO_SUCH_RADIUS for name in GIVEN
     }
@@ -261,7 +261,7 @@ def _gives(name, head):
     return bool(head[f"{name}_radius_m"] or by_standard)
 
 
-def _of_tube(given, wall):
+def _explain_tube(given, wall):
     if wall == "straps":
         return RINGS_WITHOUT_TUBE
     if None in (given["width_m"], given["height_m"]):
@@ -269,7 +269,7 @@ def _of_tube(given, wall):
     return ROUND_TUBE
 
 
-def _of_wall(given, values, has_points):
+def _explain_wall(given, values, has_points):
     """Reasons for inputs of horizontal cylinders and spheres."""
     switched_off = values["corrections"]["plate"] is False
     is_subtracted = values["survey"]["side"] == "outside" and not switched_off
@@ -278,7 +278,7 @@ def _of_wall(given, values, has_points):
         "expected only with side = outside and a thickness_mm: without them nothing is subtracted",
     )
     return {
-        "diameter": _from_points(has_points),
+        "diameter": _explain_measured(has_points),
         "offset": ""
         if has_points
         else message("no_points", "expected only with points; without points, declare diameter"),
@@ -286,7 +286,7 @@ def _of_wall(given, values, has_points):
     }
 
 
-def _of_sphere(values):
+def _explain_sphere(values):
     """Reasons for inputs of the expansion of a sphere under load."""
     table, survey = values["table"], values["survey"]
     is_off = values["corrections"]["head"] is False
@@ -312,5 +312,5 @@ def _of_sphere(values):
     return reasons
 
 
-def _from_points(has_points):
+def _explain_measured(has_points):
     return message("from_points", "its uncertainty comes from the points") if has_points else ""

@@ -40,20 +40,20 @@ def is_surveyed(tables):
 def has_shape(tables):
     """Return True if measurements other than points.csv determine the wall of a vertical tank."""
     has_readings = has_survey(tables) or is_strapped(tables) or is_sighted(tables)
-    return has_readings or any(method.replaces_points for method in _given(tables))
+    return has_readings or any(method.replaces_points for method in _find_methods(tables))
 
 
 def is_completed(tables):
     """Return True if a method supplies the courses that a survey does not measure."""
-    return any(method.completes_survey for method in _given(tables))
+    return any(method.completes_survey for method in _find_methods(tables))
 
 
 def has_inside_sizes(tables):
     """Return True if the only data of the wall are sizes of the inside."""
-    return any(method.is_inside for method in _given(tables)) and not is_surveyed(tables)
+    return any(method.is_inside for method in _find_methods(tables)) and not is_surveyed(tables)
 
 
-def _given(tables):
+def _find_methods(tables):
     """Methods for vertical tanks that have readings in a job."""
     return [method for method in methods_for("vertical") if method.is_given(tables)]
 
@@ -124,9 +124,9 @@ class Extent:
 def extent_of(values, tables, kind):
     """Extent of a tank of this kind; unknown for a mesh and for an unknown kind."""
     if kind == "vertical":
-        return _of_vertical(values, tables["bottom"])
+        return _measure_vertical(values, tables["bottom"])
     if kind == "horizontal":
-        return _of_horizontal(values["horizontal"], values, wall_of(tables) is not None)
+        return _measure_horizontal(values["horizontal"], values, wall_of(tables) is not None)
     if kind == "sphere":
         diameter = values["sphere"]["diameter_m"] or values["tank"]["nominal_diameter_m"]
         if diameter is None:
@@ -136,7 +136,7 @@ def extent_of(values, tables, kind):
     return Extent()
 
 
-def _of_vertical(values, bottom):
+def _measure_vertical(values, bottom):
     height, diameter = (values["tank"][f"nominal_{name}_m"] for name in ("height", "diameter"))
     shell_z, zero = values["datum"]["bottom_z_m"], zero_z(values)
     area = None if diameter is None else np.pi / 4 * diameter**2
@@ -158,7 +158,7 @@ def _of_vertical(values, bottom):
     return Extent(height, min(lowest), top, area)
 
 
-def _of_horizontal(given, values, has_points):
+def _measure_horizontal(given, values, has_points):
     height = given["height_m"] or given["diameter_m"] or values["tank"]["nominal_diameter_m"]
     width = given["width_m"] or height
     length = given["length_m"]

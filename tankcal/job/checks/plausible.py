@@ -91,7 +91,7 @@ def _celsius(fahrenheit):
     return (fahrenheit - FAHRENHEIT_ZERO) * FAHRENHEIT_STEP
 
 
-def _beyond(value, bounds):
+def _is_outside(value, bounds):
     return value is not None and not bounds[0] <= value <= bounds[1]
 
 
@@ -99,7 +99,7 @@ def _check_temperatures(values, raw, log):
     service = values["checks"]["service"] or AMBIENT
     shell, air = values["survey"]["shell_temperature_c"], values["checks"]["air_temperature_c"]
     reference = values["table"]["reference_temperature_c"]
-    if _beyond(air, AIR_C):
+    if _is_outside(air, AIR_C):
         text = message(
             "air_temperature_strange",
             "{found_c:g} degC in the air, expected {low_c:g} to {high_c:g}: in degrees Fahrenheit,"
@@ -117,7 +117,7 @@ def _check_temperatures(values, raw, log):
 
 def _check_range(found, bounds, section, key, raw, log):
     """Return False, after a warning, if a temperature is implausible for the service."""
-    if not _beyond(found, bounds):
+    if not _is_outside(found, bounds):
         return True
     text = message(
         "temperature_strange",
@@ -134,7 +134,11 @@ def _check_range(found, bounds, section, key, raw, log):
 
 
 def _check_beside_air(shell, air, service, raw, log):
-    if None not in (shell, air) and service == AMBIENT and _beyond(shell - air, SHELL_OVER_AIR_K):
+    if (
+        None not in (shell, air)
+        and service == AMBIENT
+        and _is_outside(shell - air, SHELL_OVER_AIR_K)
+    ):
         text = message(
             "shell_unlike_air",
             "{found_c:g} degC, and the air had {air_c:g} (checks.air_temperature_c): expected"
@@ -153,8 +157,10 @@ def _check_expansion(values, shell, raw, log):
         corrected = values["survey"]["shell_temperature_c"] is not None
         if corrected and values["corrections"]["temperature"] is not False:
             _check_given("expansion_per_k", shell, raw, log)
-    elif bounds is not None and _beyond(found, bounds):
-        others = [metal for metal in EXPANSION_PER_K if not _beyond(found, EXPANSION_PER_K[metal])]
+    elif bounds is not None and _is_outside(found, bounds):
+        others = [
+            metal for metal in EXPANSION_PER_K if not _is_outside(found, EXPANSION_PER_K[metal])
+        ]
         hint = message("power_of_ten", "is a digit or a power of ten wrong?")
         if others:
             hint = message(
@@ -170,7 +176,7 @@ def _check_modulus(values, shell, raw, log):
     if found is None:
         if loads_the_shell(values) or values["survey"]["liquid_level_m"]:
             _check_given("e_gpa", shell, raw, log)
-    elif bounds is not None and _beyond(found, bounds):
+    elif bounds is not None and _is_outside(found, bounds):
         hint = message("another_metal", "is it another metal? Then say so in checks.shell")
         _tell_strange("e_gpa", "GPa", found, bounds, shell, hint, raw, log)
 
@@ -232,14 +238,14 @@ def _check_courses(values, courses, log):
                 "plate_thick",
                 "{found_mm:g} mm, expected at most {limit_mm:.3g} mm for {head_m:.4g} m of shell"
                 " above it and a diameter of {diameter_m:g} m: two or ten times too thick?",
-                **_of_course(plate, most, head, diameter),
+                **_course_values(plate, most, head, diameter),
             )
         elif plate < least:
             text = message(
                 "plate_thin",
                 "{found_mm:g} mm, expected {limit_mm:.3g} mm or more for {head_m:.4g} m of shell "
                 "above it and a diameter of {diameter_m:g} m: is it in centimetres, or half of it?",
-                **_of_course(plate, least, head, diameter),
+                **_course_values(plate, least, head, diameter),
             )
         if text is not None:
             log.warning(courses.file, text, row, "thickness_mm")
@@ -254,7 +260,7 @@ def _check_courses(values, courses, log):
         log.warning(courses.file, text, courses.rows[0], "thickness_mm")
 
 
-def _of_course(plate, limit, head, diameter):
+def _course_values(plate, limit, head, diameter):
     return {"found_mm": plate, "limit_mm": limit, "head_m": head, "diameter_m": diameter}
 
 
@@ -305,21 +311,21 @@ def _check_solid(values, kind, raw, log):
             "solid_plate_thick",
             "{found_mm:g} mm, expected {least_mm:.3g} to {most_mm:.3g} mm for a diameter of"
             " {diameter_m:g} m: two or ten times too thick, or with the insulation?",
-            **_of_solid(plate, least, most, diameter),
+            **_solid_values(plate, least, most, diameter),
         )
     elif plate < least:
         text = message(
             "solid_plate_thin",
             "{found_mm:g} mm, expected {least_mm:.3g} to {most_mm:.3g} mm for a diameter of"
             " {diameter_m:g} m: ten times too thin, or in centimetres?",
-            **_of_solid(plate, least, most, diameter),
+            **_solid_values(plate, least, most, diameter),
         )
     else:
         return
     tell(log.warning, raw, kind, "thickness_mm", text)
 
 
-def _of_solid(plate, least, most, diameter):
+def _solid_values(plate, least, most, diameter):
     return {"found_mm": plate, "least_mm": least, "most_mm": most, "diameter_m": diameter}
 
 

@@ -416,7 +416,7 @@ def check_tiny_sds(tables, registers, raw, log):
             is_tiny = (sd > 0) & (sd < least)
             if is_tiny.any():
                 place = int(np.argmax(is_tiny))
-                expected = _expected(column, sd[place], int(is_tiny.sum()))
+                expected = _sd_message(column, sd[place], int(is_tiny.sum()))
                 tell(column, sd[is_tiny].min(), table.file, expected, table.rows[place], column)
     register = raw.registers.get("instruments")
     for name, given in registers["instruments"].items():
@@ -424,11 +424,11 @@ def check_tiny_sds(tables, registers, raw, log):
             if given.get(key) is not None and 0 < given[key] < least:
                 row = register.rows.get(name) if register else None
                 column = f"{name}.{key}" if name else key
-                file, expected = raw.file_of("instruments"), _expected(key, given[key], 1)
+                file, expected = raw.file_of("instruments"), _sd_message(key, given[key], 1)
                 tell(key, given[key], file, expected, row, column)
 
 
-def _expected(column, found, count):
+def _sd_message(column, found, count):
     if column == "s_mm":
         return message(
             "sd_below_any_mm",

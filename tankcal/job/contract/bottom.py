@@ -291,7 +291,7 @@ def _check_depths(table, rise, diameter, log):
     """Check the heights of the bottom points above the edge, m, against the diameter."""
     highest = max(LEAST_DEPTH_M, RISE_FACTOR * diameter)
     deepest = max(LEAST_DEPTH_M, diameter)
-    texts = [_off_edge(z, highest, deepest) for z in rise]
+    texts = [_off_edge_message(z, highest, deepest) for z in rise]
     bad = (rise > highest) | (rise < -deepest)
     _tell_rows(table, "z_m", bad, texts, log)
     steep = np.min(rise) < -max(LEAST_DEPTH_M, STEEP_FACTOR * diameter)
@@ -304,7 +304,7 @@ def _check_depths(table, rise, diameter, log):
         log.warning(table.file, expected, table.rows[int(np.argmin(rise))], "z_m")
 
 
-def _off_edge(z, highest, deepest):
+def _off_edge_message(z, highest, deepest):
     """Return the message for a point too high above or too deep below the edge."""
     if z > 0:
         return message(

@@ -45,7 +45,7 @@ _TARGET_HEIGHT = _number(
 _INSTRUMENT = _name("instrument", "instrument of instruments.toml", required=False)
 
 
-def _known_points():
+def _sd_columns():
     """Return the columns of the standard deviations of known coordinates."""
     return tuple(
         _number(
@@ -159,7 +159,7 @@ FILM = (
 CONTROL = (
     _name("point", "name of the point, unique in each system"),
     *_coordinates(),
-    *_known_points(),
+    *_sd_columns(),
     _name("system", "name of another coordinate system; blank: system of the survey", False),
     USE,
 )

@@ -437,7 +437,7 @@ def check_correlations(table, inputs, raw, log):
         Raw job, and log of its problems.
     """
     before = len(log.problems)
-    known = _declared(inputs, raw)
+    known = _declared_names(inputs, raw)
     pairs, first_row = {}, {}
     for row, first, second, r in zip(
         table.rows, *map(table.of, ("input", "with", "r")), strict=True
@@ -474,7 +474,7 @@ def check_correlations(table, inputs, raw, log):
         _check_together(table, pairs, log)
 
 
-def _declared(inputs, raw):
+def _declared_names(inputs, raw):
     """Return the names of the declared inputs; None if some of them could not be read."""
     if inputs is None:
         is_there = "uncertainty" in raw.tables

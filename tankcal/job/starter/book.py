@@ -217,7 +217,7 @@ def write_table(sheet, table, form, texts, look):
             sheet.write_string(row, 0, MARK, look.mark)
     sheet.set_column(0, 0, _MARK_WIDTH)
     sheet.write_string(TITLE, 1, texts.of("titles", table), look.title)
-    sheet.write_string(NOTE, 1, opened(texts.note("tables", table)), look.plain)
+    sheet.write_string(NOTE, 1, capitalize(texts.note("tables", table)), look.plain)
     sheet.write_string(RULE, 1, texts.of("cover", "rows", row=first_row + 1), look.mark)
     for column, (field, width) in enumerate(zip(fields, widths, strict=True), 1):
         _write_heading(sheet, column, table, field, texts, look)
@@ -371,7 +371,7 @@ def print_on_a4(sheet, texts, is_landscape=False):
     sheet.set_footer(f"&L&8&A&R&8{texts.of('cover', 'page')}")
 
 
-def opened(text):
+def capitalize(text):
     """Note with a capital letter."""
     return text[:1].upper() + text[1:]
 
@@ -440,7 +440,7 @@ def _condition(field, choices, cell, texts):
             else None
         )
     if field.kind == "number":
-        return _of_number(field, cell)
+        return _number_validation(field, cell)
     if field.kind == "date":
         return {
             "validate": "date",
@@ -453,7 +453,7 @@ def _condition(field, choices, cell, texts):
     return None
 
 
-def _of_number(field, cell):
+def _number_validation(field, cell):
     bounds = {"validate": "decimal", "criteria": "between"}
     if is_wide(field) or (not field.above_low and not field.choices and field.high < math.inf):
         return bounds | {"minimum": field.low, "maximum": field.high}

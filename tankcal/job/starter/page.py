@@ -108,7 +108,7 @@ def _filled_table(table, fields):
         if not any(name in names for names in names_of_rows):
             at = next((k + 1 for k, names in enumerate(names_of_rows) if previous in names), 0)
             note = known[0].note
-            rows.insert(at, (_shown(name, fields), note, _values_of_all([name], fields)))
+            rows.insert(at, (_key_text(name, fields), note, _values_of_all([name], fields)))
             names_of_rows.insert(at, {name})
         previous = name
     return [f"| {head} | {LAST} |", "| --- | --- | --- |", *(f"| {' | '.join(r)} |" for r in rows)]
@@ -120,11 +120,11 @@ def _filled_row(line, fields):
     names = [name for name in _NAME.findall(first) if name in fields]
     for obsolete in set(_NAME.findall(first)) - set(names):
         first = re.sub(rf"(?:, )?(?:\*\*)?`{re.escape(obsolete)}`(?:\*\*)?", "", first).strip(", ")
-    shown = _NAME.sub(lambda match: _shown(match[1], fields), first)
+    shown = _NAME.sub(lambda match: _key_text(match[1], fields), first)
     return (shown, prose, _values_of_all(names, fields)) if names else None
 
 
-def _shown(name, fields):
+def _key_text(name, fields):
     return f"**`{name}`**" if all(field.required for field in fields[name]) else f"`{name}`"
 
 

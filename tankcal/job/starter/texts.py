@@ -93,13 +93,13 @@ def english_notes():
         "sections": SECTION_NOTES,
         "tables": TABLE_NOTES,
         "registers": REGISTER_NOTES,
-        "keys": _of_fields(KEYS),
-        "columns": _of_fields({name: COLUMNS[name] for name in TABLE_NOTES}),
-        "entries": _of_fields(REGISTER_KEYS),
+        "keys": _notes_of_fields(KEYS),
+        "columns": _notes_of_fields({name: COLUMNS[name] for name in TABLE_NOTES}),
+        "entries": _notes_of_fields(REGISTER_KEYS),
     }
 
 
-def _of_fields(owners):
+def _notes_of_fields(owners):
     return {
         f"{owner}.{field.name}": field.note for owner, fields in owners.items() for field in fields
     }
@@ -130,11 +130,11 @@ class Texts:
         most = {"name": MAX_NAME, "tank id": MAX_NAME, "text": MAX_TEXT}.get(field.kind)
         if field.kind != "number":
             code = field.kind.replace(" ", "_")
-            return self.of("expected", code, most=most, unit=_bracketed(field))
+            return self.of("expected", code, most=most, unit=_unit_in_brackets(field))
         low, high = (self._number(bound) for bound in (field.low, field.high))
-        return self.of("expected", _bounds(field), low=low, high=high, unit=_bracketed(field)) + (
-            self.of("expected", "or_word", word=", ".join(field.choices)) if field.choices else ""
-        )
+        return self.of(
+            "expected", _bounds(field), low=low, high=high, unit=_unit_in_brackets(field)
+        ) + (self.of("expected", "or_word", word=", ".join(field.choices)) if field.choices else "")
 
     def choice(self, word):
         """A choice, "true" or "false" in the words of the form."""
@@ -188,6 +188,6 @@ def is_wide(field):
     return field.low == -field.high and field.high >= 1e5
 
 
-def _bracketed(field):
+def _unit_in_brackets(field):
     _, unit = split_unit(field.name)
     return f" ({unit})" if unit else ""

@@ -90,7 +90,7 @@ def with_bottom(job, inside, registration, estimates=()):
     inside : CloudInside or None
         None: the job is returned unchanged.
     registration : Registration
-    estimates : sequence of ToldCause
+    estimates : sequence of EstimatedCause
         Offsets without a prior that the wall estimated: they are corrected, and their remaining
         standard uncertainty is kept.
 
@@ -109,7 +109,7 @@ def with_bottom(job, inside, registration, estimates=()):
     values = {name: cause.value for name, cause in estimated.items()}
     vertical = np.tile([0.0, 0.0, 1.0], (len(point), 1))
     shared = shared_by_beams(
-        points.xyz_m[point], scan, vertical, registration, job.clouds.tools, told_m=values
+        points.xyz_m[point], scan, vertical, registration, job.clouds.tools, estimated_m=values
     )
 
     def heights(column_m):

@@ -118,7 +118,7 @@ def _client_of(workers, worker_bytes, more):
             client = stack.enter_context(Client(address, timeout=CONNECT_S, set_as_default=False))
         except Exception as error:  # a port of another service may cause any error
             raise _no_answer_error(address, error) from error
-        with failures_told():
+        with report_failures():
             _check_workers(client, workers)
         yield client
 
@@ -191,7 +191,7 @@ class Watch:
 
 
 @contextlib.contextmanager
-def failures_told():
+def report_failures():
     """Turn any error of dask, of the network or of another machine into a one-line InputError."""
     try:
         yield

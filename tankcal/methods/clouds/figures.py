@@ -36,7 +36,7 @@ def joints_m(record):
     return [float(end - zero) for end in ends]
 
 
-def of_turn(obstruction):
+def azimuth_intervals(obstruction):
     """Azimuth intervals of an obstruction within 0 to 360 degrees, as (from, to) pairs."""
     low, high = obstruction["azimuth_from_deg"], obstruction["azimuth_to_deg"]
     return [(low, min(high, 360.0))] + ([(0.0, high - 360)] if high > 360 else [])
@@ -78,7 +78,7 @@ def cloud_map(paper):
 def _obstructions(ax, obstructions):
     """Draw the outlines of obstructions."""
     for obstruction in obstructions:
-        for low, high in of_turn(obstruction):
+        for low, high in azimuth_intervals(obstruction):
             ax.add_patch(
                 Rectangle(
                     (low, obstruction["bottom_m"]), high - low,

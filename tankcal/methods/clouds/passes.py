@@ -32,9 +32,9 @@ from tankcal.messages import message
 from tankcal.methods.clouds.cluster import (
     Watch,
     count_cores,
-    failures_told,
     is_installed,
     open_client,
+    report_failures,
 )
 from tankcal.survey.readings import certified_distance_m
 
@@ -369,7 +369,7 @@ class ClusterPasses:
 
     def sample(self, most):
         """Return a `PointSample` of at most `most` points."""
-        with failures_told():
+        with report_failures():
             return self._reduced(_sample_part, _add_samples, most)
 
     def cells(self, surface, grid, scans):
@@ -384,7 +384,7 @@ class ClusterPasses:
         -------
         WallCells
         """
-        with failures_told():
+        with report_failures():
             sums = self._reduced(_cells_part, _add_cells, surface, grid, scans)
         cells = WallCells(surface, grid, scans)
         cells.add_packed(sums)
@@ -395,7 +395,7 @@ class ClusterPasses:
 
         Results of different shares are combined by their method `merge`.
         """
-        with failures_told():
+        with report_failures():
             return self._reduced(_taken_part, _add_taken, taken_of, *sizes)
 
     def _reduced(self, part_of, add_parts, *sizes):

@@ -262,7 +262,7 @@ def save_clouds(result):
             )
             for weld in cells.welds
         ],
-        shared=shared_of(clouded.told, certificates, clouded.beamed.told_m),
+        shared=shared_of(clouded.estimates, certificates, clouded.beamed.estimated_m),
         shared_part=shared_part_of(result.table),
         map=_map(cells, zero_m),
         inside=_inside(result, zero_m),

@@ -7,7 +7,7 @@ from tankcal.report.tables.table import Column, Table
 from tankcal.text.digits import LITRE_DECIMALS
 
 
-def _scanned(paper, row):
+def _scan_sentence(paper, row):
     """Return a sentence on the point clouds with their numbers of points, or None."""
     clouds = paper.record.get("clouds")
     if not clouds:
@@ -23,7 +23,7 @@ def _scanned(paper, row):
     )
 
 
-FACTS = (Column("scanned", text=_scanned, sheet=True),)
+FACTS = (Column("scanned", text=_scan_sentence, sheet=True),)
 
 
 def _column(key, heading, unit="", decimals=None, **more):

@@ -22,7 +22,7 @@ from tankcal.methods.clouds.readings import offset_untold
 from tankcal.pipeline.checks.survey import causes_unlike_certificates
 from tankcal.pipeline.scanned_solids import fit_scan
 from tankcal.pipeline.wall.finding import find_wall, joints_of, through_wall
-from tankcal.pipeline.wall.shared_unknowns import told_causes
+from tankcal.pipeline.wall.shared_unknowns import estimate_causes
 from tankcal.pipeline.wall.surveyed import s_transform
 from tankcal.survey.beams import BeamPoints, points_of_beams
 from tankcal.survey.registration import Registration, register
@@ -50,7 +50,7 @@ class Clouded:
         Means of cells: the points of the job, in their order.
     beamed : BeamPoints
         Points with the causes that beams share.
-    told : tuple of ToldCause
+    estimates : tuple of EstimatedCause
         Offsets and scales estimated by a vertical wall.
     left_out : ndarray of int, shape (scans,)
         Points of each scan in excluded boxes.
@@ -63,7 +63,7 @@ class Clouded:
     cells: object
     readings: object
     beamed: BeamPoints
-    told: tuple = ()
+    estimates: tuple = ()
     left_out: np.ndarray | None = None
     inside: CloudInside | None = None
 
@@ -104,16 +104,16 @@ def find_wall_in_clouds(
     if job.tank.kind != "vertical":
         return job, clouded, fit_scan(job, dof)
     wall = find_wall(job, progress, dof, amplitudes)
-    estimates = told_causes(job, wall)
+    estimates = estimate_causes(job, wall)
     offsets_m = {
         estimate.name: estimate.value for estimate in estimates if np.isinf(estimate.u_before)
     }
     if offsets_m:
         job, clouded = _as_points(job, clouded, offsets_m)
         wall = find_wall(job, progress, dof, amplitudes)
-        estimates = told_causes(job, wall)
+        estimates = estimate_causes(job, wall)
         job = with_bottom(job, clouded.inside, clouded.registration, estimates)
-    return job, replace(clouded, told=estimates), wall
+    return job, replace(clouded, estimates=estimates), wall
 
 
 def points_of_clouds(job, adjustment, progress, reading=IN_PROCESS):
@@ -198,7 +198,7 @@ def registered(job, adjustment):
         raise InputError(Problem(file, error.args[0])) from error
 
 
-def _as_points(job, clouded, told_m=None):
+def _as_points(job, clouded, estimated_m=None):
     """Return the job with the readings of its clouds as points, all on one side of the wall."""
     readings, surface = clouded.readings, clouded.cells.surface
     beamed = points_of_beams(
@@ -209,7 +209,7 @@ def _as_points(job, clouded, told_m=None):
         clouded.registration,
         job.clouds.tools,
         file=FILE,
-        told_m=told_m,
+        estimated_m=estimated_m,
     )
     side = np.array(job.clouds.sides)[readings.scan]
     # Readings from the other side are moved through the plate to the side of the survey.
@@ -433,7 +433,9 @@ def check_clouds(job, survey, clouded):
         *_check_hidden_courses(job, clouded),
         *_check_assumed_uncertainties(job, clouded),
         *check_inside(job, clouded.inside),
-        *causes_unlike_certificates(survey, clouded.told, FILE, taken_off_m=clouded.beamed.told_m),
+        *causes_unlike_certificates(
+            survey, clouded.estimates, FILE, taken_off_m=clouded.beamed.estimated_m
+        ),
     )
 
 

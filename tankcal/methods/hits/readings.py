@@ -137,14 +137,14 @@ def _check_instrument(files, hits, name, given, places, undeclared_offset):
                 "missing; expected it here, or in each row of wall_hits.csv",
             )
             files.tell_key(files.log.problem, "instruments", name, key, expected)
-    if given["u_scale_ppm"] == FREE and not _told_by_network(files, name):
+    if given["u_scale_ppm"] == FREE and not _is_calibrated_by_network(files, name):
         expected = message(
             "scale_of_hits_free",
             "found free; expected its standard uncertainty: no distance of a network tells it",
         )
         files.tell_key(files.log.problem, "instruments", name, "u_scale_ppm", expected)
     offset = given["u_offset_mm"]
-    is_known = offset is not None and (offset != FREE or _told_by_network(files, name))
+    is_known = offset is not None and (offset != FREE or _is_calibrated_by_network(files, name))
     is_determined = undeclared_offset is None and (
         tells_by_tape(files.tables)
         or len(set(hits.of("setup"))) > 1  # perhaps from both sides
@@ -165,7 +165,7 @@ def offset_unknown():
     )
 
 
-def _told_by_network(files, name):
+def _is_calibrated_by_network(files, name):
     """Return True if distances of a network determine scale and offset of the instrument."""
     setups, distances = files.tables["setups"], files.tables["distances"]
     slopes = files.tables["slope_distances"]

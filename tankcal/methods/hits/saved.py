@@ -94,7 +94,7 @@ def save_hits(result):
     certificates = {name: tool.certificate for name, tool in result.job.hits.instruments.items()}
     return HitsRecord(
         setups=setups_used(result.job.hits, result.sighting.poses, _mask_of_used(result)),
-        shared=shared_of(result.sighting.told, certificates, result.sighting.told_m),
+        shared=shared_of(result.sighting.estimates, certificates, result.sighting.estimated_m),
         rings=_rings(result),
         incidence=incidence_classes(result.sighting.incidence_rad),
         control=_control_readings(repeats),

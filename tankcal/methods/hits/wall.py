@@ -17,7 +17,7 @@ from tankcal.geometry.circles import taubin_circle
 from tankcal.messages import list_some, message
 from tankcal.methods.hits.readings import offset_unknown
 from tankcal.pipeline.wall.finding import find_wall, joints_of, take_points, through_wall
-from tankcal.pipeline.wall.shared_unknowns import told_causes
+from tankcal.pipeline.wall.shared_unknowns import estimate_causes
 from tankcal.pipeline.wall.surveyed import s_transform
 from tankcal.sections import coordinates_of
 from tankcal.survey import wall_points
@@ -75,7 +75,7 @@ def find_hit_wall(job, adjustment, progress, dof=np.inf, *, amplitudes=None):
     job, sighting = sight_wall(job, adjustment, progress)
     wall, sizes = find_wall(job, progress, dof, amplitudes), None
     for number in range(ROUNDS + 1):
-        estimates = wall.told
+        estimates = wall.estimated_unknowns
         is_last = number == ROUNDS
         if estimates is None or estimates.largest_m < (UNSETTLED_M if is_last else SETTLED_M):
             break
@@ -86,11 +86,13 @@ def find_hit_wall(job, adjustment, progress, dof=np.inf, *, amplitudes=None):
             sizes = wall.field.amplitudes
         poses = settle_poses(sighting.poses, estimates.poses)
         sighted = sight(job.hits, poses, estimates.offsets_m)
-        offsets = {name: sighting.told_m.get(name, 0.0) + correction
+        offsets = {name: sighting.estimated_m.get(name, 0.0) + correction
                    for name, correction in estimates.offsets_m.items()}  # fmt: skip
-        job, sighting = _as_points(job, replace(sighted, beside=sighting.beside, told_m=offsets))
+        job, sighting = _as_points(
+            job, replace(sighted, beside=sighting.beside, estimated_m=offsets)
+        )
         wall = find_wall(job, progress, dof, amplitudes, sizes=sizes)
-    return job, replace(sighting, told=told_causes(job, wall)), wall
+    return job, replace(sighting, estimates=estimate_causes(job, wall)), wall
 
 
 def _not_settled(moved_m):

@@ -28,7 +28,7 @@ from tankcal.pipeline.checks.survey import (
 )
 from tankcal.pipeline.checks.wall import (
     check_nominal,
-    check_size_told,
+    check_size_measured,
     courses_with_few,
     girth_m,
     levels_with_few,
@@ -81,8 +81,8 @@ def check_hits(job, wall, sighting):
         *check_lost_setups(job, wall, sighting),
         *_check_setups(job, wall, sighting),
         *check_nominal(job, wall, job.hits.file),
-        *(() if wall.by_inputs else check_size_told(job, [*job.hits.instruments])),
-        *causes_unlike_certificates(wall, sighting.told, taken_off_m=sighting.told_m),
+        *(() if wall.by_inputs else check_size_measured(job, [*job.hits.instruments])),
+        *causes_unlike_certificates(wall, sighting.estimates, taken_off_m=sighting.estimated_m),
     )
 
 
@@ -139,7 +139,7 @@ def _check_assumed_places(job, wall, poses):
         for (name, _), tie in zip(poses.keys, poses.ties, strict=True)
         if tie == WALL and np.isnan(stations.get(setups[name].station, unknown)[:2]).any()
     ]
-    if names and wall.told is not None and not is_size_measured(job):
+    if names and wall.estimated_unknowns is not None and not is_size_measured(job):
         text = message(
             "places_assumed",
             "the stations of set-ups {setups} are blank and were assumed to be evenly spaced; the"
@@ -471,7 +471,7 @@ def repeats_of(control):
                 for reading in sequence
             ]
         )
-        direction, zenith, distance = (_since_first(column) for column in values.T)
+        direction, zenith, distance = (_differences_from_first(column) for column in values.T)
         repeated.append(
             RepeatedTarget(
                 setup,
@@ -487,7 +487,7 @@ def repeats_of(control):
     return tuple(repeated)
 
 
-def _since_first(values):
+def _differences_from_first(values):
     """Differences (k,) from the first finite value."""
     finite = np.flatnonzero(np.isfinite(values))
     return values - (values[finite[0]] if len(finite) else 0.0)

@@ -159,7 +159,7 @@ def _check_plummets(lines, offsets, plummets, raw, log):
             log.problem(lines.file, expected, row, "instrument")
     if not register:
         return
-    turned = _turned(lines, offsets, used)
+    turned = _plummets_on_both_faces(lines, offsets, used)
     for name in dict.fromkeys(used):
         if name not in plummets:
             continue
@@ -175,7 +175,7 @@ def _check_plummets(lines, offsets, plummets, raw, log):
             log.problem(file, expected, row, f"{name}.{key}" if name else key)
 
 
-def _turned(lines, offsets, used):
+def _plummets_on_both_faces(lines, offsets, used):
     """Plummets with positions, not all at one level, that were read on both faces."""
     of_line = dict(zip(lines.of("line"), used, strict=True))
     columns = (offsets.of(name) for name in ("line", "level_m", "face", "use"))

@@ -65,7 +65,7 @@ def control_text(paper, control):
     )
 
 
-def _metered(paper, row):
+def _liquid_sentence(paper, row):
     """Return a sentence on runs, steps and range of dips of a calibration by liquid, or None."""
     liquid = paper.record.get("liquid")
     if not liquid:
@@ -75,7 +75,7 @@ def _metered(paper, row):
     return paper.word("texts.liquid_metered", **counts, low=low, high=high)
 
 
-def _metered_liquid(paper, row):
+def _liquid_properties(paper, row):
     """Return density and thermal expansion of the liquid, each with its u, in words, or None."""
     liquid = paper.record.get("liquid")
     return liquid and paper.word(
@@ -85,7 +85,7 @@ def _metered_liquid(paper, row):
     )
 
 
-def _metered_with(paper, row):
+def _meter_sentence(paper, row):
     """Return the meters with their factors and provers in words, or None."""
     liquid = paper.record.get("liquid")
     return liquid and "; ".join(_meter(paper, meter) for meter in liquid["meters"])
@@ -99,16 +99,16 @@ def _meter(paper, meter):
     return paper.word("texts.liquid_prover", meter=text, prover=meter["prover"])
 
 
-def _metered_table(paper, row):
+def _certified_table_text(paper, row):
     liquid = paper.record.get("liquid")
     return liquid and paper.word(f"liquid_tables.{liquid['certified']}")
 
 
 FACTS = (  # of certificate and workbook
-    Column("metered", text=_metered, sheet=True),
-    Column("metered_liquid", text=_metered_liquid, sheet=True),
-    Column("metered_with", text=_metered_with, sheet=True),
-    Column("metered_table", text=_metered_table, sheet=True),
+    Column("metered", text=_liquid_sentence, sheet=True),
+    Column("metered_liquid", text=_liquid_properties, sheet=True),
+    Column("metered_with", text=_meter_sentence, sheet=True),
+    Column("metered_table", text=_certified_table_text, sheet=True),
 )
 
 

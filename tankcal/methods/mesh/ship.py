@@ -81,7 +81,7 @@ def part_of_mesh(job, mesh, switches, heel=(0.0, 0.0)):
         warmed = replace(mesh, vertices_m=scale * mesh.vertices_m)
         solid = mesh_part(warmed, zero if zero is None else scale * zero)
     else:
-        solid = _on_ship(job.ship, mesh, scale, heel)
+        solid = _ship_part(job.ship, mesh, scale, heel)
     return SolidPart(
         solid,
         scale,
@@ -96,7 +96,7 @@ def ship_pipe(ship):
     return Pipe(*in_ship_frame([ship.pipe_bottom_m, ship.pipe_top_m], ship.bow_azimuth_rad))
 
 
-def _on_ship(ship, mesh, scale, heel):
+def _ship_part(ship, mesh, scale, heel):
     """Solid inside the mesh of a ship's tank, with levels along its pipe."""
     contracted = None if ship.contraction is None else 1 - ship.contraction
     return piped_mesh(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.job.checking import has_rows, is_not_given, missing_beside, refuse_repeated, tell
-from tankcal.job.checks.bearing import of_temperature
+from tankcal.job.checks.bearing import explain_temperature
 from tankcal.job.checks.extent import is_supplemented, is_surveyed
 from tankcal.job.checks.tapes import refuse_others
 from tankcal.job.covariance import Archive, check_covariance, read_covariance
@@ -47,7 +47,7 @@ def _tell_without_rows(raw, log):
     if raw.tables.get("radii", ()) is None:
         return  # unreadable, reported already
     for section in KEYS:
-        for key in _given(raw, section)[:1]:
+        for key in _given_keys(raw, section)[:1]:
             expected = message(
                 "settings_without_radii",
                 "given without {file}; expected both or none",
@@ -56,7 +56,7 @@ def _tell_without_rows(raw, log):
             tell(log.problem, raw, section, key, expected)
 
 
-def _given(raw, section):
+def _given_keys(raw, section):
     entries = (raw.settings or {}).get(section, {})
     return [key for key in entries if not is_not_given(raw, section, key)]
 
@@ -134,7 +134,7 @@ def _check_settings(values, tables, raw, log):
             "change_without_survey",
             "given without a survey; expected one of some courses beside the former radii",
         )
-        for key in () if _has_unreadable_survey(raw) else _given(raw, "change"):
+        for key in () if _has_unreadable_survey(raw) else _given_keys(raw, "change"):
             refuse("change", key, expected)
         return
     expected = message(
@@ -188,7 +188,7 @@ def useless_inputs(values, tables):
         " own uncertainty",
     )
     inputs = ("scale", "offset", "paint", "shell_temperature", "survey_level")
-    reasons = of_temperature(values, values["radii"]["reference_temperature_c"])
+    reasons = explain_temperature(values, values["radii"]["reference_temperature_c"])
     return reasons | dict.fromkeys((*inputs, "survey_density"), why)
 
 

@@ -38,7 +38,7 @@ from tankcal.messages import message
 from tankcal.methods.strapping.wall import StrappedWall
 from tankcal.pipeline.tanks import body_of, shell_zero
 from tankcal.pipeline.wall.finding import joints_of
-from tankcal.pipeline.wall_straps import UprightAxis, told_courses
+from tankcal.pipeline.wall_straps import UprightAxis, courses_with_readings
 from tankcal.tank.budgets import Factor
 from tankcal.uncertainty import factor_of
 
@@ -326,11 +326,11 @@ def measured_courses(job, surveyed):
     courses_of_points = set()
     if not isinstance(surveyed, StrappedWall):
         courses_of_points = {section.group.course for section in surveyed.sections}
-    return np.array(sorted(told_courses(job, courses_of_points)), dtype=int)
+    return np.array(sorted(courses_with_readings(job, courses_of_points)), dtype=int)
 
 
 def _radii_by_survey(job, surveyed, measured):
-    """`Found` of the measured courses: sqrt(A / pi), with A the mean area from joint to joint."""
+    """Results of the measured courses: sqrt(A / pi), with A the mean area from joint to joint."""
     # No bottom, deadwood, roof or liquid: the radii then describe the empty shell alone.
     job_of_survey = replace(
         job,

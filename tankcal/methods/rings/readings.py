@@ -20,7 +20,7 @@ from tankcal.job.contract.courses import SMALLEST_THICKNESS_MM, thin_plate
 from tankcal.job.model import Ring
 from tankcal.job.plausibility import IMPOSSIBLE_MISS
 from tankcal.job.structure import structure
-from tankcal.job.tapes import gauged
+from tankcal.job.tapes import mean_plates
 from tankcal.messages import message
 from tankcal.survey.strapping import MOST_STRAPS, too_many_straps
 
@@ -198,7 +198,7 @@ def _check_sum(rings, whole_m, log):
 
 def make_rings(tables):
     """Build the `Ring`s from end A to end B from tables without problems."""
-    gauge_means = gauged(tables["thickness"])
+    gauge_means = mean_plates(tables["thickness"])
     return tuple(
         structure(Ring, cells | gauged_plate(gauge_means.get(cells["ring"])), name=cells["ring"])
         for cells in tables["rings"].records()

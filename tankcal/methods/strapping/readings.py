@@ -19,7 +19,7 @@ from tankcal.job.checks.tapes import (
 )
 from tankcal.job.contract.observations import READINGS
 from tankcal.job.plausibility import IMPOSSIBLE_MISS
-from tankcal.job.tapes import gauged, metres, tools_of
+from tankcal.job.tapes import mean_plates, metres, tools_of
 from tankcal.messages import message
 from tankcal.survey.strapping import MOST_STRAPS, Strap, Strapping, reduce_straps, too_many_straps
 
@@ -105,7 +105,7 @@ def make_strapping(values, tables, registers):
         shape_sd_m=metres(values["shell"]["shape_sd_mm"]),
         wave_m=metres(keys["wave_mm"]),
         helix_m=metres(keys["helix_mm"]),
-        plate_sd_m={name: means[1] for name, means in gauged(tables["thickness"]).items()},
+        plate_sd_m={name: means[1] for name, means in mean_plates(tables["thickness"]).items()},
     )
 
 

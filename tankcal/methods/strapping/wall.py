@@ -27,8 +27,8 @@ from tankcal.pipeline.wall_straps import (
     TapedWall,
     UprightAxis,
     adjust_readings,
+    courses_with_readings,
     gauged_plates,
-    told_courses,
     typical_shape_m,
 )
 from tankcal.survey.strapping import reduce_straps, tapes_used
@@ -87,7 +87,7 @@ def find_strapped_wall(job, progress, amplitudes=None):
         insets = insets_of(job, job.switches)
         readings += readings_of_offsets(lines, adjusted, courses, insets)
         places += adjusted_offsets
-    unmeasured = readings_of_untold(job, told_courses(job, set()), joints, zero)
+    unmeasured = readings_of_untold(job, courses_with_readings(job, set()), joints, zero)
     readings, places = readings + unmeasured, places + [-1] * len(unmeasured)
     readings, tested, field = adjust_readings(
         readings, (joints, zero, nominal), amplitudes, snooping=job.snooping

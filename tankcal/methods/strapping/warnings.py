@@ -15,7 +15,7 @@ from tankcal.adjust import CRITICAL, SD_OVER_MEDIAN
 from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.methods.base import accompanying_methods, completing_method
-from tankcal.methods.moved_setups import tested
+from tankcal.methods.moved_setups import precision_and_pull
 from tankcal.pipeline.checks.size import (
     allowed_departure_m,
     check_side,
@@ -60,7 +60,7 @@ def check_tapes(job, straps, strapping):
         *_check_pulls(straps),
         *_check_certificates(straps),
         *_check_comparisons(straps, strapping),
-        *_of_copies([reduced_strap.strap for reduced_strap in straps.reduced]),
+        *_find_copies([reduced_strap.strap for reduced_strap in straps.reduced]),
     )
 
 
@@ -146,7 +146,7 @@ def _check_certificates(straps):
     """Problems of impossible certificates: temperature, thickness, section or correction."""
     for tape, _ in straps.tapes:
         temperature = tape.temperature_c
-        if temperature is not None and not _within(temperature, CERTIFIED_C):
+        if temperature is not None and not _is_within(temperature, CERTIFIED_C):
             celsius = (temperature - 32) / 1.8
             text = message(
                 "certified_temperature_strange",
@@ -158,7 +158,7 @@ def _check_certificates(straps):
                 celsius=celsius,
             )
             yield Problem(TAPES, text, column=f"{tape.name}.certified_temperature_c")
-        if not _within(tape.thickness_m, THICKNESS_M):
+        if not _is_within(tape.thickness_m, THICKNESS_M):
             text = message(
                 "tape_thickness_strange",
                 "{found_mm:g} mm; tapes are {low_mm:g} to {high_mm:g} mm thick",
@@ -167,7 +167,7 @@ def _check_certificates(straps):
                 high_mm=1000 * THICKNESS_M[1],
             )
             yield Problem(TAPES, text, column=f"{tape.name}.thickness_mm")
-        if np.isfinite(tape.stiffness_n) and not _within(tape.stiffness_n, STIFFNESS_N):
+        if np.isfinite(tape.stiffness_n) and not _is_within(tape.stiffness_n, STIFFNESS_N):
             text = message(
                 "tape_stiffness_strange",
                 "section_mm2 times e_gpa: 50 N stretch this tape by {found:.0f} ppm, others by"
@@ -249,11 +249,11 @@ def _check_comparisons(straps, strapping):
         yield Problem(COMPARED, text, column="working_m")
 
 
-def _within(value, limits):
+def _is_within(value, limits):
     return limits[0] <= value <= limits[1]
 
 
-def _of_copies(straps):
+def _find_copies(straps):
     """Problems of readings equal to the last digit more often than chance permits.
 
     The readings may be of a single circumference, or all readings of a circumference may repeat
@@ -273,7 +273,7 @@ def _of_copies(straps):
             copies += [(equal[0], strap)] if equal else []
             chances.append(min(1.0, place * chance_of_equal(strap.sd_m, digit)))
     if copies and bdtrc(len(copies) - 1, len(chances), np.mean(chances)) < BY_CHANCE:
-        yield from (_copied(*pair) for pair in copies)
+        yield from (_copy_problem(*pair) for pair in copies)
     yield from _check_copied_circumferences(tuple(by_name.values()), digit)
 
 
@@ -295,7 +295,7 @@ def _check_copied_circumferences(circumferences, digit_m):
             [chance_of_equal(strap.sd_m, digit_m) for strap in first[1:]]
         )
         if [strap.reading_m for strap in first] == [strap.reading_m for strap in second]:
-            copies.append(_copied(first[0], second[0]))
+            copies.append(_copy_problem(first[0], second[0]))
     if copies and pdtrc(len(copies) - 1, expected) < BY_CHANCE:
         yield from copies
 
@@ -341,7 +341,7 @@ def _digit_m(straps):
     return 10.0**-decimals
 
 
-def _copied(first, second):
+def _copy_problem(first, second):
     """Problem of a reading that repeats another reading."""
     text = message(
         "reading_copied",
@@ -416,7 +416,7 @@ def strapped_together(wall):
     if not repeated:
         return {}
     count = len(wall.field.radius_m)
-    precision, pull = tested(wall.field, wall.field.covariance_m2, count)
+    precision, pull = precision_and_pull(wall.field, wall.field.covariance_m2, count)
     discrepant = {}
     for repeats in repeated:
         index = [number for number, _ in repeats]

@@ -32,7 +32,7 @@ from tankcal.methods.moved_setups import (
 from tankcal.pipeline.checks.survey import limits_of
 from tankcal.pipeline.checks.wall import (
     check_nominal,
-    check_size_told,
+    check_size_measured,
     courses_with_few,
     girth_m,
     levels_with_few,
@@ -428,7 +428,7 @@ def _check_scale(job):
     is_alone = len(names) == 1 and "distances" not in {
         table.table for table in job.network.readings
     }
-    return check_size_told(job, [*names]) if is_alone else ()
+    return check_size_measured(job, [*names]) if is_alone else ()
 
 
 def _check_levels(job, wall):

@@ -108,7 +108,7 @@ def open_questions(job, datum, causes):
             "datum = {choice}: no observation fixes the heights of the frame; bottom_z_m is taken "
             "in the frame of the results, which is held by {held}: check its value in that frame",
             choice=datum.choice,
-            held=_held(datum.held),
+            held=_list_points(datum.held),
         )
         problems.append(Problem("job.toml", text, column="datum.bottom_z_m"))
     scales = [
@@ -127,7 +127,7 @@ def open_questions(job, datum, causes):
     return tuple(problems)
 
 
-def _held(names):
+def _list_points(names):
     if "all" in names:
         return message("all_points", "all points")
     return list_some(names, SHOWN)
@@ -153,7 +153,7 @@ def warn_of_vague_vertical(points):
         sd_mm_per_m=1000 * sd,
         remedy=OF_VERTICAL,
     )
-    return of_points(points, [text])
+    return locate_at_points(points, [text])
 
 
 def warn_of_vague_points(points, accepted, sds_m, noise_m):
@@ -215,7 +215,7 @@ def warn_of_vague_points(points, accepted, sds_m, noise_m):
                 sd_mm=1000 * median_m,
             )
         )
-    return of_points(points, texts)
+    return locate_at_points(points, texts)
 
 
 def warn_of_undeclared(undeclared):
@@ -244,7 +244,7 @@ def incomplete_certificate(job, has_letterhead=False):
     return (Problem("job.toml", text, column="certificate"),)
 
 
-def against_nominal(tank, capacity_m3):
+def compare_with_nominal(tank, capacity_m3):
     """Warning of a capacity far from the nominal volume."""
     nominal = tank.nominal_volume_m3
     if nominal is None or abs(capacity_m3 / nominal - 1) <= VOLUME_MISS:
@@ -260,7 +260,7 @@ def against_nominal(tank, capacity_m3):
     return (Problem("job.toml", text, column="tank.nominal_volume_m3"),)
 
 
-def of_points(points, texts):
+def locate_at_points(points, texts):
     """`Problem`s with the given texts, located at the points."""
     return [Problem(origin_of(points), text) for text in texts]
 
@@ -402,7 +402,7 @@ def causes_unlike_certificates(wall, estimates, file="instruments.toml", *, take
     Parameters
     ----------
     wall : Wall
-    estimates : sequence of ToldCause
+    estimates : sequence of EstimatedCause
     file : str
         File of the certificates.
     taken_off_m : dict

@@ -31,7 +31,12 @@ from tankcal.pipeline.checks.size import (
     is_size_declared,
     nominal_radius_m,
 )
-from tankcal.pipeline.checks.survey import LARGE_NOISE_M, SHOWN, noise_is_estimated, of_points
+from tankcal.pipeline.checks.survey import (
+    LARGE_NOISE_M,
+    SHOWN,
+    locate_at_points,
+    noise_is_estimated,
+)
 from tankcal.pipeline.wall.surveyed import tell_undecided
 
 FEWEST_POINTS, ADVISED_POINTS = 5, 10  # least and recommended number of points of a section
@@ -55,7 +60,7 @@ def weak_sections(job, groups, azimuth_rad):
     for group in groups:
         ordered = np.sort(azimuth_rad[group.members])
         gap = np.degrees(np.max(np.diff(ordered, append=ordered[0] + 2 * np.pi)))
-        named = {"section": _shown(job, group), "course": job.courses[group.course].name}
+        named = {"section": _section_name(job, group), "course": job.courses[group.course].name}
         if len(ordered) < ADVISED_POINTS:
             sparse.append((len(ordered), named))
         if gap > WIDE_GAP_DEG:
@@ -68,7 +73,7 @@ def weak_sections(job, groups, azimuth_rad):
             if len(sections) > TOLD_ALONE
             else [text_of_section(*section) for section in sections]
         )
-    return of_points(job.points, texts)
+    return locate_at_points(job.points, texts)
 
 
 def _with_few(count, named):
@@ -91,7 +96,7 @@ def _all_with_few(sections):
         "or more are advised",
         all=len(sections),
         count=min(count for count, _ in sections),
-        sections=_listed(sections),
+        sections=_list_sections(sections),
         advised=ADVISED_POINTS,
     )
 
@@ -115,11 +120,11 @@ def _all_with_gaps(sections):
         "most: {sections}; measure there",
         all=len(sections),
         gap_deg=max(gap_deg for gap_deg, _ in sections),
-        sections=_listed(sections),
+        sections=_list_sections(sections),
     )
 
 
-def _listed(sections):
+def _list_sections(sections):
     """Names of the first sections, with those of their courses."""
     names = [
         message("section_of_course", "{section} (course {course})", **named)
@@ -128,7 +133,7 @@ def _listed(sections):
     return list_some(names, SHOWN)
 
 
-def _shown(job, group):
+def _section_name(job, group):
     """Name of a section in messages; the level for a section that is named by it."""
     level = group.name.removeprefix(f"{job.courses[group.course].name} ")
     names_levels = any(method.names_levels for method in given_methods(job))
@@ -162,7 +167,7 @@ def warn_of_taper(job, field):
         percent=100 * mean_offset,
         taper_mm=1000 * np.sqrt(3 * _variance_m2(field, "common taper")),
     )
-    return of_points(job.points, [text])
+    return locate_at_points(job.points, [text])
 
 
 def _variance_m2(field, component):
@@ -219,11 +224,11 @@ def check_shell(job, shell, sections, given_sd_m):
                     "the radius changes by {jump_mm:.0f} mm from section {below} to section"
                     " {above}: is one of them not the wall?",
                     jump_mm=1000 * jump,
-                    below=_shown(job, below.group),
-                    above=_shown(job, above.group),
+                    below=_section_name(job, below.group),
+                    above=_section_name(job, above.group),
                 )
             )
-    return of_points(job.points, texts)
+    return locate_at_points(job.points, texts)
 
 
 def _texts_of_scatter(shell, given_sd_m):
@@ -427,7 +432,7 @@ def warn_of_sections(job, wall):
                 sections=list_some(texts_of_sections, SHOWN),
             )
         )
-    return of_points(job.points, texts)
+    return locate_at_points(job.points, texts)
 
 
 def _ratio(test):
@@ -509,7 +514,7 @@ def check_nominal(job, wall, file):
         yield Problem(file, text)
 
 
-def check_size_told(job, instruments):
+def check_size_measured(job, instruments):
     """Yield a warning of a wall whose size only the distances of instruments determine.
 
     A wrong constant or scale in all of them changes every radius without any contradiction in the

@@ -19,7 +19,14 @@ import numpy as np
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import message
-from tankcal.pipeline.liquid.body import Known, Loaded, column_of, load_geometry, places_of, stacked
+from tankcal.pipeline.liquid.body import (
+    Known,
+    Loaded,
+    column_of,
+    load_geometry,
+    places_of,
+    stack_columns,
+)
 from tankcal.tank.liquid import (
     Effect,
     Fill,
@@ -237,7 +244,7 @@ def adjusted_at(geometry, fill, run_effect, corrections_m=None):
     misclosure = held.copy()
     for place, deviate in moved_inputs:
         misclosure += deviate * column_of(sources, place)
-    effects = [Effect("geometry", stacked(sources, len(fill))), *readings.common]
+    effects = [Effect("geometry", stack_columns(sources, len(fill))), *readings.common]
     effects += _bottom_effects(geometry, metering, fill, loaded, by_step)
     by_density = by_step @ (loaded.by_density * metering.u_density_kg_m3)
     if np.any(by_density):

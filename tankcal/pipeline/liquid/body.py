@@ -339,7 +339,7 @@ def wide_input(name, u, unit, as_read):
     return DeclaredInput(name, u, unit, as_read, is_default=True)
 
 
-def stacked(sources, rows):
+def stack_columns(sources, rows):
     """Return the columns of all sources side by side, shape (rows, c)."""
     return np.hstack([np.zeros((rows, 0)), *(source.columns_m3 for source in sources)])
 
@@ -639,7 +639,7 @@ class JointBody(Body):
         if of_geometry is None:
             of_geometry = self._of_geometry(self.plain, levels)
         # Sum of the effects of the estimates: geometry, volume below the first dip, and flexing.
-        by_y = stacked(of_geometry, len(levels)) @ known.gain
+        by_y = stack_columns(of_geometry, len(levels)) @ known.gain
         by_y = by_y + np.outer(known.share(levels), _gain_or_zeros(known.bottom_gain, by_y))
         return by_y + np.outer(self._head_m(levels), _gain_or_zeros(known.flex_gain, by_y))
 
@@ -676,7 +676,7 @@ class JointBody(Body):
     def _correction_m3(self, levels):
         """Correction (rows,) of the volumes by liquid; `slim` limits the cost of a row."""
         known, sources = self.known, self._of_geometry(self.slim, levels)
-        correction = stacked(sources, len(levels)) @ self.weights
+        correction = stack_columns(sources, len(levels)) @ self.weights
         for place, deviate in known.moved:
             # Moved inputs have changed the geometry itself already: their linear part must not
             # count twice.

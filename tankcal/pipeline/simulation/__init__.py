@@ -460,7 +460,7 @@ class Model:
         )
         even = even[kept]
         if len(bent):
-            simulation = _merged(simulation, even, self._simulate_bent_rows(bent, goal), bent)
+            simulation = _merge(simulation, even, self._simulate_bent_rows(bent, goal), bent)
         places = np.sort(np.concatenate([even, bent]))
         u = np.linalg.norm(self.inputs.slopes, axis=1)
         all_volumes = spread_to_all(simulation, places, self.quadratic.value, u, goal.digits)
@@ -544,7 +544,7 @@ class Model:
         return weights
 
 
-def _merged(quadratic, even, bent_simulation, bent):
+def _merge(quadratic, even, bent_simulation, bent):
     """Combine two simulations of different volumes into one."""
     order = np.argsort(np.concatenate([even, bent]))
     pairs = zip(quadratic.by_volume.items(), bent_simulation.by_volume.values(), strict=True)

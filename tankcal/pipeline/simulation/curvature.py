@@ -201,10 +201,10 @@ def curvature(job, survey, body, levels_m, declared, least_m3):
     least_m3 : ndarray, shape (rows,)
         u of each row, m3. Second derivatives below 1e-4 of it in all rows are neglected.
     """
-    chosen_rows = _picked(len(levels_m))
+    chosen_rows = _pick_rows(len(levels_m))
     columns_by_pair = {}
     for name in declared:
-        columns = _by_input(job, survey, body, levels_m, chosen_rows, name, declared)
+        columns = _curvature_by_input(job, survey, body, levels_m, chosen_rows, name, declared)
         for other, column in columns.items():
             columns_by_pair.setdefault(tuple(sorted((name, other))), []).append(column)
     u_of_rows = np.where(least_m3 > 0, least_m3, np.inf)
@@ -217,12 +217,12 @@ def curvature(job, survey, body, levels_m, declared, least_m3):
     return Curvature(tuple(kept_pairs), empty if values is None else values)
 
 
-def _by_input(job, survey, body, levels_m, picked, name, declared):
+def _curvature_by_input(job, survey, body, levels_m, picked, name, declared):
     """{other input: second derivatives (rows,), times both u} by one input."""
     if name == "datum":
-        return _by_datum(body, levels_m, declared)
+        return _curvature_by_datum(body, levels_m, declared)
     if name == "scale":
-        return _by_scale(body, levels_m, declared) if body.shell is not None else {}
+        return _curvature_by_scale(body, levels_m, declared) if body.shell is not None else {}
     if name == "tilt" and body.shell is not None:
         in_shell = np.minimum(levels_m, body.shell.volume.height_m)
         return {"tilt": body.shell.volume_m3(in_shell) * declared["tilt"] ** 2}
@@ -256,7 +256,7 @@ def _slopes_of_moved(job, survey, levels_m, name, step):
     return [tank.derivatives(np.minimum(levels_m, tank.highest_m)) for tank in tanks]
 
 
-def _by_datum(body, levels_m, declared):
+def _curvature_by_datum(body, levels_m, declared):
     """Second derivatives by the datum and each other input.
 
     Parts that move with the dips, such as deadwood, have none by the datum.
@@ -277,7 +277,7 @@ def _by_datum(body, levels_m, declared):
     }
 
 
-def _by_scale(body, levels_m, declared):
+def _curvature_by_scale(body, levels_m, declared):
     """Second derivatives by the scale and each other input."""
     slopes = body.derivatives(levels_m)
     return {
@@ -287,7 +287,7 @@ def _by_scale(body, levels_m, declared):
     }
 
 
-def _picked(rows):
+def _pick_rows(rows):
     spread = np.linspace(0, rows - 1, min(rows, PICKED)).round().astype(int)
     return np.unique([*range(min(rows, FROM_EMPTY)), *spread])
 

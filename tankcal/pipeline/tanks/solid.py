@@ -33,11 +33,11 @@ def factor_of_unseen(kind, parts, sizes, assumed):
         Share of each amplitude that is assumed.
     """
     sizes = np.maximum(sizes, 1e-30)
-    origin = told_by(float(sizes @ assumed / sizes.sum()))
+    origin = origin_of_amplitude(float(sizes @ assumed / sizes.sum()))
     return Factor(kind, factor_of(sum(parts)), note=origin)
 
 
-def told_by(assumed):
+def origin_of_amplitude(assumed):
     """Code of the origin of an amplitude, from the share of it that is assumed."""
     if assumed < LEARNED:
         return "learned"

@@ -206,7 +206,7 @@ def vertical_body(job, wall, switches, uncertain):
     if switches.roof and job.roof is not None:
         parts.append(_roof(job, zero))
     if switches.bottom and job.bottom.form != "flat":
-        parts = _on_its_bottom(job, wall, shell, zero, parts)
+        parts = _add_bottom(job, wall, shell, zero, parts)
     return Body(
         tuple(parts),
         job.inputs,
@@ -218,7 +218,7 @@ def vertical_body(job, wall, switches, uncertain):
     )
 
 
-def _on_its_bottom(job, wall, shell, zero, parts):
+def _add_bottom(job, wall, shell, zero, parts):
     """Parts with the bottom: beside them, or below them if it was calibrated by liquid."""
     bottom = job.bottom
     if bottom.form == "liquid":
@@ -320,7 +320,7 @@ def _shell(job, wall, switches, uncertain):
         insets_of(job, switches),
         scale if switches.tilt else scale / np.sqrt(leaning),
         stretch if switches.tilt else stretch * leaning,
-        departures=_declared(job),
+        departures=_declared_names(job),
     )
     features = _functionals(wall, volume) if uncertain else None
     bearing = bearing_inputs(job, switches)
@@ -342,7 +342,7 @@ def _shell(job, wall, switches, uncertain):
     )
 
 
-def _declared(job):
+def _declared_names(job):
     return {declared_input.name for declared_input in job.inputs}
 
 
@@ -351,7 +351,7 @@ def _factors(job, wall, volume, features):
     has_means = any(method.has_means for method in given_methods(job))
     return (
         *wall.factors(job, features.weights),
-        *_factors_of_unseen(wall, volume, features, _declared(job), scanned=has_means),
+        *_factors_of_unseen(wall, volume, features, _declared_names(job), scanned=has_means),
     )
 
 

@@ -37,7 +37,7 @@ from tankcal.pipeline.checks.wall import (
 )
 from tankcal.pipeline.overruling import decisions_of, refuse_kept
 from tankcal.pipeline.read_wall import noise_by_inputs
-from tankcal.pipeline.wall.shared_unknowns import told_unknowns, unbound_of, with_spread
+from tankcal.pipeline.wall.shared_unknowns import add_spread, estimate_unknowns, unbound_of
 from tankcal.pipeline.wall.surveyed import (
     Wall,
     given_covariance,
@@ -45,7 +45,7 @@ from tankcal.pipeline.wall.surveyed import (
     radial_sds,
     undecided_halves,
 )
-from tankcal.pipeline.wall_straps import PointsOfWall, join_readings, told_courses
+from tankcal.pipeline.wall_straps import PointsOfWall, courses_with_readings, join_readings
 from tankcal.sections import (
     LEAST_SD_M,
     coordinates_of,
@@ -191,13 +191,15 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
         points = PointsOfWall(sites, radius, noise, unbound, by_inputs)
         read, straps = join_readings(job, points, amplitudes, joints, is_known=is_known)
         field, count = read.field, len(read.accepted)
-        by_points = _padded(by_points, count)
+        by_points = _pad_rows(by_points, count)
         by_inputs = {name: np.pad(column, (0, count)) for name, column in by_inputs.items()}
         undecided = np.pad(undecided, ((0, count), (0, 0)))
-    told = None
+    estimated_unknowns = None
     if job.points.unbound:
-        told = told_unknowns(job.points, unbound, field, (accepted, by_points, covariance))
-        sections = tuple(map(partial(with_spread, told), sections, to_fit))
+        estimated_unknowns = estimate_unknowns(
+            job.points, unbound, field, (accepted, by_points, covariance)
+        )
+        sections = tuple(map(partial(add_spread, estimated_unknowns), sections, to_fit))
     return Wall(
         shell=shell,
         joints_m=joints,
@@ -215,7 +217,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
         if any(method.has_own_offset for method in given_methods(job))
         else (),
         origins_m=np.array([sample.centre_m for sample in samples]),
-        told=told,
+        estimated_unknowns=estimated_unknowns,
     )
 
 
@@ -251,7 +253,7 @@ def _derivatives_by_inputs(points, by_points, accepted):
     return {name: by_points @ column[index] for name, column in points.by_inputs.items()}
 
 
-def _padded(by_points, more):
+def _pad_rows(by_points, more):
     """Derivatives of readings by points (n, 3 m), with rows of zeros for `more` other readings."""
     empty = scipy.sparse.csr_array((more, by_points.shape[1]))
     return scipy.sparse.vstack([by_points, empty], format="csr")
@@ -459,7 +461,7 @@ def _refuse_weak(job, groups, height):
                     height_m=height_m,
                 )
             )
-    measured = told_courses(job, {group.course for group in groups})
+    measured = courses_with_readings(job, {group.course for group in groups})
     is_completed = completing_method(job) is not None
     problems += [
         message(

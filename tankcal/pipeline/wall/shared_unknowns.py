@@ -58,7 +58,7 @@ LEAST_MOTION_M = 0.005  # least joint change of all radii, over the prior range,
 
 
 @dataclass(frozen=True)
-class ToldCause:
+class EstimatedCause:
     """A cause that readings share, before and after the adjustment of the wall.
 
     Lengths are in m; a scale is relative.
@@ -85,12 +85,12 @@ class ToldCause:
     correlation: float
 
 
-def told_causes(job, wall):
-    """Return a `ToldCause` for each instrument offset and scale that the points of a wall share.
+def estimate_causes(job, wall):
+    """Return an `EstimatedCause` for each offset and scale that points of a wall share.
 
     Returns
     -------
-    tuple of ToldCause
+    tuple of EstimatedCause
         Causes with a prior first, then causes without a prior.
     """
     kinds = ("instrument_offset", "instrument_scale")
@@ -122,7 +122,7 @@ def told_causes(job, wall):
         # The covariance with the radius is -A c.
         correlation = -(along @ column) / np.sqrt(variance) / u_radius
         estimates.append(
-            ToldCause(
+            EstimatedCause(
                 cause.name,
                 cause.what,
                 u,
@@ -139,7 +139,7 @@ def told_causes(job, wall):
             correlation = -covariance_with_radius[number] / u_after / u_radius
             value = -float(values[number])
             estimates.append(
-                ToldCause(
+                EstimatedCause(
                     cause.name, cause.what, np.inf, value, u_after, _limit_correlation(correlation)
                 )
             )
@@ -175,7 +175,7 @@ def _unseen_variance(field, weight):
 
 
 @dataclass(frozen=True)
-class ToldUnknowns:
+class EstimatedUnknowns:
     """Estimates of offsets and poses without a prior.
 
     Attributes
@@ -231,8 +231,8 @@ class ToldUnknowns:
         return half + half.transpose(0, 2, 1)
 
 
-def told_unknowns(points, unbound, field, parts):
-    """`ToldUnknowns` of a field whose points have unknowns in common.
+def estimate_unknowns(points, unbound, field, parts):
+    """`EstimatedUnknowns` of a field whose points have unknowns in common.
 
     Parameters
     ----------
@@ -258,7 +258,7 @@ def told_unknowns(points, unbound, field, parts):
     )
     moved = np.column_stack([effect.column_m[index] for effect in shared]) @ ways
     correction = -(ways @ values)
-    return ToldUnknowns(
+    return EstimatedUnknowns(
         offsets_m={effect.name: float(correction[i]) for i, effect in enumerate(shared[:count])},
         poses=correction[count:].reshape(-1, 3),
         largest_m=float(np.abs(moved @ values).max(initial=0.0)),
@@ -294,12 +294,12 @@ def _determined_combinations(spread, count):
     return scipy.linalg.block_diag(np.eye(count), axes[:, variances < SURE**2])
 
 
-def with_spread(told, section, fitted):
+def add_spread(unknowns, section, fitted):
     """Section whose circle also has the covariance of the estimated unknowns.
 
     Parameters
     ----------
-    told : ToldUnknowns
+    unknowns : EstimatedUnknowns
     section : Section
     fitted : tuple
         (group, xyz_m, covariance_m2, slope, z_m), the arguments of `fit_section`.
@@ -309,7 +309,7 @@ def with_spread(told, section, fitted):
     Section
     """
     derivative = circle_by_coordinates(section, *fitted[1:])
-    cofactor = section.circle.cofactor_m2 + told.spread_of(derivative, section.group.members)
+    cofactor = section.circle.cofactor_m2 + unknowns.spread_of(derivative, section.group.members)
     return replace(section, circle=replace(section.circle, cofactor_m2=cofactor))
 
 
@@ -399,7 +399,9 @@ def unbound_of(points, by_points, accepted):
     columns = {False: [], True: []}
     for cause in offsets_then_poses(points):
         columns[cause.what == "pose"].append(size_of(cause) * (by_points @ cause.column_m[index]))
-    return Unbound(*(_stacked(columns[is_pose], by_points.shape[0]) for is_pose in (False, True)))
+    return Unbound(
+        *(_stack_columns(columns[is_pose], by_points.shape[0]) for is_pose in (False, True))
+    )
 
 
 def offsets_then_poses(points):
@@ -414,5 +416,5 @@ def size_of(cause):
     return MOVED_M if cause.unit == "m" else TURNED_RAD
 
 
-def _stacked(columns, count):
+def _stack_columns(columns, count):
     return np.column_stack(columns) if columns else np.zeros((count, 0))

@@ -25,7 +25,7 @@ from tankcal.pipeline.read_wall import (
     inputs_read_with,
     names_of,
 )
-from tankcal.pipeline.wall.shared_unknowns import ToldUnknowns
+from tankcal.pipeline.wall.shared_unknowns import EstimatedUnknowns
 from tankcal.pipeline.wall_straps import Straps
 from tankcal.sections import Section, coordinates_of
 from tankcal.tank.body import Factor
@@ -158,7 +158,7 @@ class Wall:
     origins_m : ndarray, shape (sections, 2)
         Origin x, y of the radii of each section and of the field's centres, in the frame of the
         points, m.
-    told : ToldUnknowns or None
+    estimated_unknowns : EstimatedUnknowns or None
         Estimates of offsets and poses without a prior; None if there are none.
     """
 
@@ -176,7 +176,7 @@ class Wall:
     by_inputs: dict = field(default_factory=dict)
     without_inputs: tuple = ()
     origins_m: np.ndarray | None = None
-    told: ToldUnknowns | None = None
+    estimated_unknowns: EstimatedUnknowns | None = None
     surveyed_as = "wall"
     has_applied_inputs = False
 
@@ -203,14 +203,18 @@ class Wall:
         covariance = self.covariance_m2.take(members).propagate(by_points)
         return (
             covariance
-            if self.told is None
-            else covariance + self.told.spread_of(by_points, members)
+            if self.estimated_unknowns is None
+            else covariance + self.estimated_unknowns.spread_of(by_points, members)
         )
 
     def point_covariances_m2(self):
         """Covariance (m, 3, 3) of the coordinates of each accepted point, m2; see `spread_of`."""
         covariances = self.covariance_m2.point_blocks
-        return covariances if self.told is None else covariances + self.told.spread_alone()
+        return (
+            covariances
+            if self.estimated_unknowns is None
+            else covariances + self.estimated_unknowns.spread_alone()
+        )
 
     def factors(self, job, weights):
         """`Factor`s of the uncertainty of features, with derivatives (f, n) by the readings."""

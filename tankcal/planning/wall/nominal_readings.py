@@ -85,16 +85,16 @@ class Errors:
 
     def scale(self, tool):
         """Relative error of the scale of an instrument."""
-        return self.draw_cause("instrument_scale", tool.name) * _known(tool.u_scale, 0.0)
+        return self.draw_cause("instrument_scale", tool.name) * _value_or(tool.u_scale, 0.0)
 
     def offset_m(self, tool):
         """Error of the offset of an instrument, m."""
-        u = _known(tool.u_offset_m, UNKNOWN_OFFSET_M)
+        u = _value_or(tool.u_offset_m, UNKNOWN_OFFSET_M)
         return self.draw_cause("instrument_offset", tool.name) * u
 
     def collimation_rad(self, plummet):
         """Collimation error of a plummet, rad."""
-        u = _known(plummet.u_collimation_rad, UNKNOWN_COLLIMATION_RAD)
+        u = _value_or(plummet.u_collimation_rad, UNKNOWN_COLLIMATION_RAD)
         return self.draw_cause("collimation", plummet.name) * u
 
 
@@ -131,7 +131,7 @@ def add_network_errors(measurements, errors):
     return replace(measurements, readings=tuple(map(read, measurements.readings)))
 
 
-def _known(u, otherwise):
+def _value_or(u, otherwise):
     return otherwise if u is None or np.isnan(u) else u
 
 

@@ -166,10 +166,10 @@ def _check_lines_and_ties(plan_input, log):
         log.problem(PLAN_FILE, expected, ties.row, "setup_ties")
     _check_control(plan_input, log)
     if ties.filled_keys:
-        _need(ties, ("s_mm", "s_arcsec"), log)
+        _require(ties, ("s_mm", "s_arcsec"), log)
 
 
-def _need(entry, keys, log):
+def _require(entry, keys, log):
     """Report missing numbers that a section needs."""
     for key in keys:
         if key not in entry.filled_keys:
@@ -222,7 +222,7 @@ def _check_tangents(plan_input, nominal_m, log):
         )
         traverse.report(log.problem, "s_mm", expected)
     elif "bar" in traverse.filled_keys:
-        _need(traverse, ("s_bar_arcsec",), log)
+        _require(traverse, ("s_bar_arcsec",), log)
     for name in ("lines", "hits"):
         other_section = next(iter(plan_input.entries(name)), None)
         if other_section is not None and other_section.filled_keys:

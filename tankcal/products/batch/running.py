@@ -26,9 +26,9 @@ from tankcal.messages import message
 from tankcal.methods.clouds.cluster import (
     Watch,
     count_cores,
-    failures_told,
     is_installed,
     open_client,
+    report_failures,
 )
 from tankcal.products.batch.finding import find_former_or_none, find_jobs
 from tankcal.products.batch.journal import compute_keys, open_folder
@@ -245,7 +245,7 @@ class _WorkerRuns:
                 self._client.cancel(list(self._running))
 
     def _fill(self, left):
-        with failures_told():
+        with report_failures():
             workers = max(self._watch.look(), 1)
         self._submit_some(left, AHEAD * workers - len(self._running))
 
@@ -256,7 +256,7 @@ class _WorkerRuns:
 
     def _submit(self, task):
         key = f"tankcal_job-{uuid.uuid4().hex}"  # one task group for all jobs
-        with failures_told():
+        with report_failures():
             future = self._client.submit(do_job, task, key=key, pure=False)
         self._running[future] = task
         future.add_done_callback(self._ended.put)
@@ -266,7 +266,7 @@ class _WorkerRuns:
         from distributed.scheduler import KilledWorker
 
         task = self._running.pop(future)
-        with failures_told():
+        with report_failures():
             error, result = future.exception(), None
             if error is not None and not isinstance(error, KilledWorker):
                 raise error

@@ -83,7 +83,7 @@ def _export(options):
         max_error_m3=None if error is None else error / 1000,
         hangs_on_shell=options.gauge_on_shell, on_high_legs=options.high_legs, language=language,
     )  # fmt: skip
-    paths = write_export(export, _out(options, export, source), language)
+    paths = write_export(export, _output_file(options, export, source), language)
     if options.machine:
         print_json(
             exit_status=0, points=len(export.dip_m), error_l=1000 * export.error_m3,
@@ -111,7 +111,7 @@ def _refuse_missing(options):
         raise InputError(missing)
 
 
-def _out(options, export, source):
+def _output_file(options, export, source):
     """Return the output file: as requested, or named after tank and profile in this folder."""
     from tankcal.products.exports.exporting import default_name
 

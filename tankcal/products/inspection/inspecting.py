@@ -13,7 +13,7 @@ from tankcal.job.folder import OF_INSPECTIONS
 from tankcal.job.tables import Log
 from tankcal.messages import message
 from tankcal.methods.clouds.passes import Reading
-from tankcal.pipeline.surveying import find_survey, placed
+from tankcal.pipeline.surveying import find_survey, locate_in_book
 from tankcal.pipeline.wall.finding import warnings_of as warnings_of_wall
 from tankcal.pipeline.wall.surveyed import Wall
 from tankcal.products.inspection.edges import assess_edges
@@ -521,7 +521,7 @@ def _basis_of_job(path, progress, part_progress):
     try:
         survey = find_survey(job, progress, part_progress=part_progress)
     except InputError as error:
-        raise InputError(placed(job, error.problems)) from error
+        raise InputError(locate_in_book(job, error.problems)) from error
     job, wall = survey.job, survey.survey
     is_wall = isinstance(wall, Wall)
     warnings = (*job.warnings, *(survey.adjustment.warnings if survey.adjustment else ()))
@@ -533,7 +533,7 @@ def _basis_of_job(path, progress, part_progress):
         job=to_plain(fill_from(JobAsRead, job, inspection=job.inspection)),
         shape=to_plain(shape_record(job, wall)),
         methods=_methods({name: getattr(job, name) for name in METHODS}, is_wall),
-        warnings=to_plain(warnings_of(dict.fromkeys(placed(job, warnings)))),
+        warnings=to_plain(warnings_of(dict.fromkeys(locate_in_book(job, warnings)))),
         survey=survey,
     )
 

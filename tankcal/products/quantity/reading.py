@@ -329,7 +329,7 @@ def _read(table, settings, rows, factors):
     if "closing" not in states:
         source.tell("closing.dip_m", message("ticket_no_closing", "missing; expected the "
                     "gauging after the transfer, or of the stock"))  # fmt: skip
-    compared = _compared(source)
+    compared = _other_quantity(source)
     gaugings, taped = {}, {}
     for state in states:
         gaugings[state], taped[state] = _gauging(source, state, table)
@@ -821,7 +821,7 @@ def _refuse_negative(source, table, gaugings, product):
         source.tell_each(f"{state}.dip_m", is_negative, lambda _: text)
 
 
-def _compared(source):
+def _other_quantity(source):
     """(quantity, values (n,), U or None, source) of the other party, or None."""
     given = source.sections["compared"]
     column = source.column("compared.value")

@@ -309,7 +309,7 @@ def adjust_difference(facts, dips_m, difference_m3, volume_m3, sd_m3, usable):
     """
     area = slopes_m2(dips_m, volume_m3, sd_m3)
     columns = _derivatives(facts, dips_m, volume_m3, area)
-    rows = usable & _above_bottom(facts, dips_m, area)
+    rows = usable & _is_above_bottom(facts, dips_m, area)
     reached = (np.abs(columns[rows]) > 1e-9).any(axis=0)
     columns = columns[:, reached]
     if rows.sum() < columns.shape[1] + SPARE_ROWS:
@@ -376,7 +376,7 @@ def slopes_m2(dips_m, volume_m3, sd_m3=0.0):
     return rise / (high - low)
 
 
-def _above_bottom(facts, dips, area):
+def _is_above_bottom(facts, dips, area):
     """Whether the area at each row (rows,) of an upright tank is that of its wall."""
     if facts.kind != "vertical":
         return np.full(len(dips), True)

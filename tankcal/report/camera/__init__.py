@@ -133,14 +133,14 @@ def _heading(block):
 
 
 def _paragraph(block):
-    return _wrapped(block["text"])
+    return _wrap(block["text"])
 
 
 def _listing(block):
-    return [line for item in block["items"] for line in _wrapped(item, "- ", "  ")]
+    return [line for item in block["items"] for line in _wrap(item, "- ", "  ")]
 
 
-def _wrapped(text, first="", later=""):
+def _wrap(text, first="", later=""):
     return wrap(
         text,
         WIDTH,
@@ -152,15 +152,15 @@ def _wrapped(text, first="", later=""):
 
 
 def _result(block):
-    note = _wrapped(block["note"], _GAP, _GAP) if block["note"] else []
-    return [*_wrapped(f"{block['label']}: {block['text']}"), *note]
+    note = _wrap(block["note"], _GAP, _GAP) if block["note"] else []
+    return [*_wrap(f"{block['label']}: {block['text']}"), *note]
 
 
 def _key_values(block):
     width = max((len(name) for name, _ in block["items"]), default=0)
     lines = [block["caption"]] if block["caption"] else []
     for name, value in block["items"]:
-        lines += _wrapped(value or " ", f"{name:<{width}}{_GAP}", " " * (width + len(_GAP)))
+        lines += _wrap(value or " ", f"{name:<{width}}{_GAP}", " " * (width + len(_GAP)))
     return lines
 
 
@@ -169,7 +169,7 @@ def _table(block):
     heads = [column["heading"] for column in block["columns"]]
     units = [column["unit"] for column in block["columns"]]
     columns = [
-        _filled(texts, align, block["decimal_mark"])
+        _align(texts, align, block["decimal_mark"])
         for texts, align in zip(zip(*block["rows"], strict=True), block["align"], strict=False)
     ] or [()] * len(heads)
     rows = [heads, *([units] if any(units) else []), *zip(*columns, strict=True)]
@@ -183,11 +183,11 @@ def _table(block):
     ]
     below_head = 2 if any(units) else 1
     rule = "-" * (sum(widths) + len(_GAP) * (len(widths) - 1))
-    caption = _wrapped(block["caption"]) if block["caption"] else []
+    caption = _wrap(block["caption"]) if block["caption"] else []
     return [*caption, *lines[:below_head], rule, *lines[below_head:]]
 
 
-def _filled(texts, align, mark):
+def _align(texts, align, mark):
     """Pad the numbers of a column so that their decimal marks are aligned."""
     if align != "decimal":
         return texts

@@ -213,7 +213,9 @@ def verdict(paper):
     code = comparison["verdict"] or "none"
     note = ""
     if rule:
-        note = paper.word("texts.by_rule", rule=rule["name"], verified=_verified(paper, rule))
+        note = paper.word(
+            "texts.by_rule", rule=rule["name"], verified=_verification_text(paper, rule)
+        )
     reasons = [paper.reason(reason) for reason in comparison["reasons"]]
     return [
         blocks.result(paper.word("labels.verdict"), paper.word(f"verdicts.{code}"), note),
@@ -226,8 +228,8 @@ def verdict(paper):
                         ("rule", rule["name"]),
                         ("rule_file", rule["file"]),
                         ("rule_source", rule["source"]),
-                        ("rule_verified", _verified(paper, rule)),
-                        ("verdict_verified", _verified(paper, paper.record)),
+                        ("rule_verified", _verification_text(paper, rule)),
+                        ("verdict_verified", _verification_text(paper, paper.record)),
                         ("rule_remark", rule["remark"]),
                         (
                             "rule_asked",
@@ -242,7 +244,7 @@ def verdict(paper):
     ]
 
 
-def _verified(paper, entry):
+def _verification_text(paper, entry):
     """Return whether an entry was verified in the text of the rule, in words."""
     return paper.word(f"verified.{entry['verified']}")
 
@@ -253,7 +255,7 @@ def _legal(paper):
     if not rows:
         return []
     entries = [*paper.record["legal"], *paper.record["ages"]]
-    clauses = [f"{entry['clause']} ({_verified(paper, entry)})" for entry in entries]
+    clauses = [f"{entry['clause']} ({_verification_text(paper, entry)})" for entry in entries]
     return [
         paper.heading("legal"),
         paper.table("legal", rows, LEGAL),

@@ -373,7 +373,7 @@ def uncertainty(paper):
     some = table.volume_m3 > 0.02 * table.volume_m3[-1]  # near the bottom U over volume diverges
     figure = Figure(figsize=(WIDTH, 2.4))
     left, right = figure.subplots(1, 2)
-    for ax, values in zip((left, right), _by_geometry(paper, some), strict=False):
+    for ax, values in zip((left, right), _U_by_geometry(paper, some), strict=False):
         ax.plot(*values, color=GREY, linestyle="--", label=paper.word("legend.by_geometry"))
     left.plot(table.height_m, table.U_m3, color=INK)
     left.set_ylabel(paper.word("axes.U_m3"))
@@ -393,7 +393,7 @@ def uncertainty(paper):
     return figure
 
 
-def _by_geometry(paper, some):
+def _U_by_geometry(paper, some):
     """Return ((dips, U), (dips, U over volume in percent)) by geometry only; () without liquid."""
     liquid = getattr(paper.prediction.result, "liquid", None)
     if liquid is None:

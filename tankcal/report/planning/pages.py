@@ -272,7 +272,7 @@ def outlook(paper):
         *table(paper),
         *_weak(paper),
         *_reliability(paper),
-        *_simulated(paper),
+        *_simulation_blocks(paper),
         *changes(paper),
         *design(paper),
     ]
@@ -473,7 +473,7 @@ def _reliability(paper):
         paper.heading("reliability"),
         paper.paragraph("reliability"),
         paper.table("reliability", rows, columns),
-        *_uncontrolled(paper),
+        *_uncontrolled_blocks(paper),
     ]
 
 
@@ -481,7 +481,7 @@ def _name_of_group(paper, group):
     return group_name(paper.words, {"name": group.name, "kind": group.kind})
 
 
-def _uncontrolled(paper):
+def _uncontrolled_blocks(paper):
     """Return the blocks of the effect of errors in uncontrolled readings on the volume."""
     rows = []
     for group in paper.prediction.reliability:
@@ -509,7 +509,7 @@ def _uncontrolled(paper):
 # ---- simulated surveys
 
 
-def _simulated(paper):
+def _simulation_blocks(paper):
     simulated = paper.simulated
     if simulated is None:
         return []

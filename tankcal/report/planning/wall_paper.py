@@ -78,7 +78,7 @@ def wall_outlook(paper):
         *_filling(paper),
         *_courses(paper),
         *_reliability(paper),
-        *_simulated(paper),
+        *_simulation_blocks(paper),
         *changes(paper),
         *design(paper),
     ]
@@ -132,7 +132,7 @@ def _reliability(paper):
     ]
 
 
-def _simulated(paper):
+def _simulation_blocks(paper):
     simulated = paper.simulated
     if simulated is None:
         return []

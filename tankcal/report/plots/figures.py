@@ -185,10 +185,10 @@ def _polar_panels(rings, factor, words):
         row, column = divmod(number, columns)
         centre = np.array([[(column + 0.5) * width], [-(row + 0.5) * height]])
         ax.plot(*(centre + [np.sin(angle), np.cos(angle)]), color=FAINT, linewidth=0.6)
-        line = centre + _enlarged(ring.outline_deg, ring.deviation_m / ring.radius_m, factor)
+        line = centre + _enlarge(ring.outline_deg, ring.deviation_m / ring.radius_m, factor)
         ax.plot(*np.concatenate([line, line[:, :1]], axis=1), color=INK)
         residual = np.asarray(ring.residual_m) / ring.radius_m
-        points = centre + _enlarged(ring.azimuth_deg, residual, factor)
+        points = centre + _enlarge(ring.azimuth_deg, residual, factor)
         are_few = points.shape[1] <= 200  # many points would hide the outline
         style = {"markersize": 2.2, "zorder": 3} if are_few else {"markersize": 1.0, "zorder": 1}
         ax.plot(*points, ".", color=RED, **style, **rasterize_many(points[0]))
@@ -197,7 +197,7 @@ def _polar_panels(rings, factor, words):
     return figure
 
 
-def _enlarged(azimuth_deg, deviation, factor):
+def _enlarge(azimuth_deg, deviation, factor):
     """Plan coordinates (2, n) of unit-circle points with enlarged relative deviations."""
     azimuth = np.radians(azimuth_deg)
     radius = 1 + factor * deviation
@@ -236,7 +236,7 @@ def deviation_map(azimuth_deg, height_m, residual_m, joints_m, words=english_lab
     )  # fmt: skip
     ax.hlines(joints_m, *_TURN, color=GREY, linewidth=0.5)
     ax.set(xlim=_TURN, xticks=_EIGHTHS)
-    return _unrolled(figure, ax, dots, words, "residual")
+    return _label_unrolled(figure, ax, dots, words, "residual")
 
 
 @styled
@@ -273,10 +273,10 @@ def field_map(azimuth_deg, height_m, departure_m, points, joints_m, words=englis
     ax.plot(*points, ".", color=GREY, markersize=1.2, **rasterize_many(points[0]))
     ax.hlines(joints_m, 0, 360, color=GREY, linewidth=0.5)
     ax.set(xlim=(0, 360), xticks=_EIGHTHS, ylim=(joints_m[0], joints_m[-1]))
-    return _unrolled(figure, ax, mesh, words, "departure")
+    return _label_unrolled(figure, ax, mesh, words, "departure")
 
 
-def _unrolled(figure, ax, mappable, words, colours):
+def _label_unrolled(figure, ax, mappable, words, colours):
     """Label the axes and the colour bar of an unrolled wall."""
     ax.set_xlabel(words("azimuth"))
     ax.set_ylabel(words("height"))

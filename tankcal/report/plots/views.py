@@ -44,16 +44,16 @@ def plot(result, what: str | None = None) -> "Figure":
     if isinstance(result, Adjustment):
         if what is not None:
             raise ValueError(f"found {what!r}; an adjusted survey has one drawing: name none")
-        return _drawn(_network, result)
+        return _draw(_network, result)
     what = what or "capacity"
     if what not in _DRAWINGS:
         raise ValueError(f"found {what!r}; expected one of {', '.join(_DRAWINGS)}")
     if what in _OF_THE_WALL and result.wall is None:
         raise ValueError(f"no wall was surveyed: there is no drawing of its {what}")
-    return _drawn(_DRAWINGS[what], result)
+    return _draw(_DRAWINGS[what], result)
 
 
-def _drawn(draw, result):
+def _draw(draw, result):
     # matplotlib is loaded when something is drawn
     from tankcal.report.plots import figures as plots
 

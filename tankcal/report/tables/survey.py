@@ -137,15 +137,15 @@ def convert_units(readings):
         **{key: readings.arrays[key] * times_small for key in _SMALL if key in readings},
         "large_unit": Texts(units.codes, tuple(unit for unit, _ in large)),
         "small_unit": Texts(units.codes, tuple(unit for unit, _ in small)),
-        "value_unit": Texts(units.codes, _spelled(large, units.texts)),
-        "unit": Texts(units.codes, _spelled(small, units.texts)),
+        "value_unit": Texts(units.codes, _spell(large, units.texts)),
+        "unit": Texts(units.codes, _spell(small, units.texts)),
     }
 
 
 _SMALL = ("residual", "sd", "mdb", "change")
 
 
-def _spelled(units, names):
+def _spell(units, names):
     return tuple(
         numbers.spelled(unit) or name for (unit, _), name in zip(units, names, strict=True)
     )
@@ -169,7 +169,7 @@ def _small(key):
     return text
 
 
-def _observed(paper, row):
+def _observed_text(paper, row):
     rule = {"decimals": 4} if row["large_unit"] else {"digits": 4}
     return paper.number(row["value"], row["large_unit"], **rule)
 
@@ -204,7 +204,7 @@ READINGS = Table(
         Column("between", text=_ends_and_element),
         Column("ids", text=_ends, on="", sheet="between", width=24, csv="id"),
         Column("element", words="elements", on="", sheet="element", width=9, csv="element"),
-        Column("value", text=_observed, align="right", sheet="observed", csv="value",
+        Column("value", text=_observed_text, align="right", sheet="observed", csv="value",
                in_sheet={"text": None, "decimals": 4}),
         Column("value_unit", text=_unit_of("large_unit", "value_unit"), on="", sheet="unit",
                width=7, csv="value_unit"),
@@ -299,7 +299,7 @@ def point_columns(record, points=None):
     columns |= _sds(points.arrays["cov_m2"])
     adjusted = (record["adjustment"] or {}).get("points", [])
     if len(adjusted):
-        columns |= _adjusted(points["point"], as_columns(adjusted))
+        columns |= _results_of_points(points["point"], as_columns(adjusted))
     if record["capacity"] is not None:
         columns |= _wall_columns(points, record["rejected"])
     return ArrayColumns(columns)
@@ -318,7 +318,7 @@ def _sds(covariance):
             for i, axis in enumerate("xyz")}  # fmt: skip
 
 
-def _adjusted(names, adjusted):
+def _results_of_points(names, adjusted):
     """Return the results of the adjustment for points; other points have missing values."""
     place = {name: i for i, name in enumerate(adjusted["point"])}
     rows = np.array([place.get(name, -1) for name in names])
@@ -622,7 +622,7 @@ def _reading(paper, row):
     return paper.word("overrulings.reading", table=table, row=number)
 
 
-def _searched(paper, row):
+def _outlier_text(paper, row):
     """Return the result of the outlier test without the decision; None: not computed."""
     code = row["searched"]
     if code is None:
@@ -640,7 +640,7 @@ OVERRULINGS = Table(
         Column("reason", heading="overruling_reason"),
         Column("by", heading="decided_by"),
         Column("date", text=lambda paper, row: paper.day(row["date"]), heading="decided_on"),
-        Column("searched", text=_searched),
+        Column("searched", text=_outlier_text),
         Column("off_m", "mm", decimals=1, heading="residual_m"),
         Column("w", decimals=1),
         Column("moved_m3", "m3", decimals=LITRE),
@@ -680,7 +680,7 @@ def sentence_of(paper, row):
         parts.append(paper.word("overrulings.by", who=who))
     elif day:
         parts.append(paper.word("overrulings.on", day=day))
-    searched = _searched(paper, row)
+    searched = _outlier_text(paper, row)
     if searched is not None:
         parts.append(
             paper.word("overrulings.search", searched=searched, numbers=_numbers(paper, row))

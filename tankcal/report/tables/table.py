@@ -124,12 +124,12 @@ class Table:
         shown = [
             column for column in self.columns if column.on is None or name in column.on.split()
         ]
-        return self._order_columns(name, _known(shown, rows))
+        return self._order_columns(name, _drop_unused(shown, rows))
 
     def in_workbook(self, rows=None):
         """Return the columns of the sheet in the workbook."""
         shown = [replace(column, **column.in_sheet) for column in self.columns if column.sheet]
-        return self._order_columns("sheet", _known(shown, rows))
+        return self._order_columns("sheet", _drop_unused(shown, rows))
 
     def in_csv(self):
         """Return the columns of the CSV file."""
@@ -151,7 +151,7 @@ class Table:
         )
 
 
-def _known(columns, rows):
+def _drop_unused(columns, rows):
     """Return the columns without optional columns whose key no row has."""
     if rows is None:
         return columns

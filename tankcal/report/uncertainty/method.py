@@ -166,15 +166,15 @@ def k_sentences(paper):
     if not known:
         return []
     ks, dofs = zip(*known, strict=True)
-    k = _between(paper, [paper.number(end(ks), decimals=2) for end in (min, max)])
+    k = _between_text(paper, [paper.number(end(ks), decimals=2) for end in (min, max)])
     ends = [numbers.degrees_of_freedom(end(dofs), paper.marks) for end in (min, max)]
     if ends[0] == numbers.degrees_of_freedom(inf):
         return [paper.word("texts.k_normal", k=k, coverage=paper.coverage())]
-    dof = _between(paper, ends)
+    dof = _between_text(paper, ends)
     return [paper.word("texts.k_t", k=k, dof=dof, coverage=paper.coverage())]
 
 
-def _between(paper, ends):
+def _between_text(paper, ends):
     low, high = ends
     return low if low == high else paper.word("texts.between_values", low=low, high=high)
 

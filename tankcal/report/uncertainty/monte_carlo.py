@@ -28,7 +28,7 @@ def facts(paper):
         ("probability", paper.percent(simulation["probability"])),
         ("tolerance", paper.word("texts.tolerance", digits=simulation["digits"])),
         ("draws", draws(paper)),
-        ("curved", _curved(paper) or paper.word("texts.none_curved")),
+        ("curved", _curvature_text(paper) or paper.word("texts.none_curved")),
         ("rows_validated", validated),
         *((key, paper.number(count, decimals=0)) for key, count in counts.items()),
     ]
@@ -70,7 +70,7 @@ def _verdict(paper):
     return paper.word("texts.agrees_some", count=count, all=len(simulated), mark=MARK)
 
 
-def _curved(paper):
+def _curvature_text(paper):
     pairs = paper.record["monte_carlo"]["curved"]
     names = [[name_of_input(paper.words, name) for name in pair] for pair in pairs]
     return "; ".join(

@@ -148,7 +148,7 @@ def stated_rows(record):
         return []
     limits = {_dips(limit) for limit in record.get("limits") or ()}
     return [
-        _stated(record, budget)
+        _stated_row(record, budget)
         for budget in budgets
         if _dips(budget) not in limits or budget["stated_m3"] is not None or budget["note"]
     ]
@@ -162,12 +162,12 @@ def limit_rows(record):
     """Return the volumes of the operating levels, as `stated_rows` with the key tank_limit."""
     budgets = {_dips(budget): budget for budget in record.get("budgets", ())}
     return [
-        _stated(record, budgets[_dips(limit)]) | {"tank_limit": limit["code"]}
+        _stated_row(record, budgets[_dips(limit)]) | {"tank_limit": limit["code"]}
         for limit in record.get("limits") or ()
     ]
 
 
-def _stated(record, budget):
+def _stated_row(record, budget):
     U, low, high = (
         budget.get("stated_U_m3", budget["U_m3"]),
         budget.get("low_m3"),

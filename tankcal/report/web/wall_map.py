@@ -173,7 +173,7 @@ def cloud_map_view(paper):
                     paper.word(f"obstructions.{obstruction['guess']}"),
                 ]
                 for obstruction in record["clouds"]["obstructions"]
-                for interval in clouds.of_turn(obstruction)
+                for interval in clouds.azimuth_intervals(obstruction)
             ],
         }
     )

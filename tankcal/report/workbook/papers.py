@@ -102,11 +102,13 @@ def certificate_sheet(book, record):
             look={"bold": True, "font_color": ACCENT},
         ),
         Facts(
-            _declared(book, tank_facts(record)), sentence(words, "headings", "tank"), longest=_LONG
+            _declared_facts(book, tank_facts(record)),
+            sentence(words, "headings", "tank"),
+            longest=_LONG,
         ),
         Facts(_certificate(record, words), book.word("headings.certificate"), longest=_LONG),
         Facts(
-            _declared(book, SURVEY_DATE, SURVEY, REFERENCES),
+            _declared_facts(book, SURVEY_DATE, SURVEY, REFERENCES),
             book.word("headings.survey"),
             longest=_LONG,
         ),
@@ -143,7 +145,7 @@ def _certificate(record, words):
     ]
 
 
-def _declared(book, *tables):
+def _declared_facts(book, *tables):
     """Return (label, value, format) of declared facts with values; the format may be DATE."""
     words, lines = book.words, []
     for table in tables:
@@ -615,14 +617,14 @@ def inside_sheet(book, record):
     book.widths(sheet, *_INSIDE_WIDTHS)
     row = HEAD_ROW
     if record["solid"]:
-        row = _described(book, sheet, row, book.words["headings"]["dimensions"], record["solid"])
+        row = _write_facts(book, sheet, row, book.words["headings"]["dimensions"], record["solid"])
     for code in ("deadwood", "bottom", "top", "roof"):
         texts, declared = paper.choices(code), record.get(code)
         if not (texts or declared):
             continue
         title = corrections[code]
         if declared and code != "deadwood":
-            row = _described(book, sheet, row, title, declared) - 1
+            row = _write_facts(book, sheet, row, title, declared) - 1
         else:
             book.heading(sheet, row, title, len(_INSIDE_WIDTHS))
             row += 1
@@ -634,7 +636,7 @@ def inside_sheet(book, record):
         row += 1
 
 
-def _described(book, sheet, row, title, lines):
+def _write_facts(book, sheet, row, title, lines):
     """Write a heading and a line for each {code, value, unit}; return the next row."""
     words = book.words
     book.heading(sheet, row, title, len(_INSIDE_WIDTHS))

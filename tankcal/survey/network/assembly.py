@@ -176,7 +176,7 @@ def _refuse_coincident(survey, groups, state):
                     "ends_coincide",
                     "both ends of {observation} have the same approximate place: the "
                     "points have too few observations, or one point has two names",
-                    observation=told(survey, observations, int(np.argmax(bad))),
+                    observation=describe_observation(survey, observations, int(np.argmax(bad))),
                 )
             )
 
@@ -547,12 +547,14 @@ def name_of_exact(survey, exact, row):
     for held in exact:
         count = len(held.conditions) * held.conditions.rows
         if row < count:
-            return told(survey, held.observations, held.row_of[row // held.conditions.rows])
+            return describe_observation(
+                survey, held.observations, held.row_of[row // held.conditions.rows]
+            )
         row -= count
     raise IndexError(row)
 
 
-def told(survey, observations, row):
+def describe_observation(survey, observations, row):
     """Name of an observation in messages: its kind and its points."""
     ends = [name for name in ("origin", "start", "end", "point") if name in observations.ties]
     names = [survey.points[getattr(observations, name)[row]] for name in ends]

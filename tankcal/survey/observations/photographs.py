@@ -202,7 +202,7 @@ class PhotoRotation(Observations):
         n = len(self)
         row = np.tile(VECTOR + np.arange(3), n)
         rotation, photo = np.repeat(self.rotation, 3, axis=0), np.repeat(self.photo, 3)
-        return _held(np.zeros(3 * n), photo, row, rotation), np.repeat(np.arange(n), 3)
+        return _held_orientation(np.zeros(3 * n), photo, row, rotation), np.repeat(np.arange(n), 3)
 
 
 @dataclass(frozen=True)
@@ -274,7 +274,7 @@ def _element(rotation, i, j):
     return value, derivatives
 
 
-def _held(value, photo, row, rotation):
+def _held_orientation(value, photo, row, rotation):
     """HeldOrientation with unit standard deviations."""
     return HeldOrientation(value, np.ones(len(value)), photo=photo, row=row, rotation=rotation)
 
@@ -295,4 +295,4 @@ def _held_elements(one):
     value[upright], row[upright] = 0.0, ACROSS
     numbers = np.concatenate([numbers, upright])
     row = np.concatenate([row, np.full(len(upright), ALONG)])
-    return _held(value[numbers], one.photo[numbers], row, rotation[numbers]), numbers
+    return _held_orientation(value[numbers], one.photo[numbers], row, rotation[numbers]), numbers

@@ -614,7 +614,7 @@ def _refine(rotation, base, f1, f2):
     def move(pose, step):
         rotation, base, _ = pose
         rotation = apply_small_rotation(rotation[None], step[None, :3])[0]
-        base = base + step[3:] @ _across(base)
+        base = base + step[3:] @ _unit_vectors_across(base)
         base = base / np.linalg.norm(base)
         # E = R [b]x, with [b]x from the products of the axes and the base.
         essential = rotation @ -np.cross(np.eye(3), base)
@@ -630,7 +630,7 @@ def _refine(rotation, base, f1, f2):
     )
 
 
-def _across(base):
+def _unit_vectors_across(base):
     """Two unit vectors (2, 3) across a base of length 1, in which a step moves the base."""
     return np.linalg.svd(base[None])[2][1:]
 
@@ -643,7 +643,10 @@ def _linearise(rotation, base, f1, f2):
     a = np.empty((len(f1), 5))
     a[:, :3] = -np.cross(f2, plane @ rotation.T)  # d (R'f2).p for R <- exp([d]x) R
     a[:, 3:] = np.stack(
-        [np.sum(np.cross(direction, f1) * second_rays, axis=1) for direction in _across(base)],
+        [
+            np.sum(np.cross(direction, f1) * second_rays, axis=1)
+            for direction in _unit_vectors_across(base)
+        ],
         axis=1,
     )
     return np.sum(plane * second_rays, axis=1) / length, a / length[:, None]

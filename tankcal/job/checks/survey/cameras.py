@@ -6,7 +6,7 @@ from tankcal.camera.model import RADIAL
 from tankcal.job.cameras import (
     ASSUMED_CONVENTION,
     affinity_of,
-    at_focus,
+    focus_distortion,
     focus_keys,
     format_of,
     is_adjusted,
@@ -375,7 +375,7 @@ def _check_distortion(files, name, given, size_mm):
 
     The largest radial term and the largest decentring term are reported.
     """
-    values = at_focus(given)
+    values = focus_distortion(given)
     for names in (RADIAL_TERMS, DECENTRING_TERMS):
         keys = [PARAMETER_KEYS[parameter][0] for parameter in names]
         shares = _parts_at_corner([values[key] or 0.0 for key in keys], names, size_mm)

@@ -99,10 +99,10 @@ def places_of(files):
     known = np.array(list(of.values())).reshape(-1, 3)
     if np.sum(~np.isnan(known).any(axis=1)) > 2:
         extent = float(np.max(np.nanmax(known, axis=0) - np.nanmin(known, axis=0)))
-    return Places(of, _measured(files.tables["distances"]), extent)
+    return Places(of, _distances_by_kind(files.tables["distances"]), extent)
 
 
-def _measured(table):
+def _distances_by_kind(table):
     measured = {}
     if not has_rows(table):
         return measured
@@ -335,7 +335,9 @@ def check_gon(files, places):
             values = table.numbers(column)
             level = np.where(_is_level(files, name, table), values, np.nan)
             expected = _reciprocal(name, _sights(files, name, table, level), unit)
-            expected = expected or _known(name, _sights(files, name, table, values), unit, places)
+            expected = expected or _compare_with_known_points(
+                name, _sights(files, name, table, values), unit, places
+            )
             if expected:
                 files.log.problem(table.file, expected, None, column)
 
@@ -399,7 +401,7 @@ def _reciprocal(name, sights, unit):
     )
 
 
-def _known(name, sights, unit, places):
+def _compare_with_known_points(name, sights, unit, places):
     """Message if angles between known points fit in the other unit only, else ""."""
     if name in ("zenith_angles", "vertical_angles"):
         return ""

@@ -34,7 +34,7 @@ def check_film(files, imagery):
         name: np.array([value is not None for value in table.of(name)], dtype=bool)
         for name in ("camera", "photo")
     }
-    for is_told, expected in (
+    for is_wrong, expected in (
         (
             is_given["camera"] & is_given["photo"],
             message("film_of_both", "camera and photo are both given; expected only one of them"),
@@ -44,7 +44,7 @@ def check_film(files, imagery):
             message("film_of_none", "blank; expected a camera, or a photo"),
         ),
     ):
-        tell_rows(files.log.problem, table, is_valid & is_told, "camera", expected)
+        tell_rows(files.log.problem, table, is_valid & is_wrong, "camera", expected)
     refuse_undefined(files, table, "camera", files.registers["cameras"], "cameras")
     photos = files.tables["photos"]
     defined = () if photos is None else dict.fromkeys(photos.of("photo"))
@@ -503,11 +503,11 @@ def _is_possible(files, table, photo, readings):
         return True
     if suspected.marks:
         row = table.rows[readings.rows[repeated.first[suspected.marks[0][0]]]]
-    files.log.problem(table.file, _suspected(photo, suspected, names), row, "mark")
+    files.log.problem(table.file, _suspicion_message(photo, suspected, names), row, "mark")
     return False
 
 
-def _suspected(photo, suspicion_of_marks, names):
+def _suspicion_message(photo, suspicion_of_marks, names):
     """Message about a comparator.MarkError."""
     listed = [join_with_and([repr(names[i]) for i in group]) for group in suspicion_of_marks.marks]
     if suspicion_of_marks.what == "unit":
@@ -537,10 +537,10 @@ def _suspected(photo, suspicion_of_marks, names):
             photo=photo,
             marks=marks,
         )
-    return _misplaced(photo, suspicion_of_marks, listed)
+    return _misplaced_marks_message(photo, suspicion_of_marks, listed)
 
 
-def _misplaced(photo, suspicion_of_marks, listed):
+def _misplaced_marks_message(photo, suspicion_of_marks, listed):
     """Message about marks far from their calibrated positions."""
     share = 100 * suspicion_of_marks.size
     start = message(

@@ -36,7 +36,7 @@ class SurveyFiles:
         Job as read.
     log : Log
         Receives problems and warnings.
-    told : frozenset of (str, int)
+    reported : frozenset of (str, int)
         File and row of the rows with problems reported before.
     """
 
@@ -45,7 +45,7 @@ class SurveyFiles:
     registers: dict
     raw: object
     log: object
-    told: frozenset = field(default_factory=frozenset)
+    reported: frozenset = field(default_factory=frozenset)
 
     def is_unreadable(self, name):
         """Return True if the table or register exists but is not readable."""
@@ -54,7 +54,7 @@ class SurveyFiles:
 
     def sound(self, table):
         """True for the rows of a table without a problem, shape (n,)."""
-        return np.array([(table.file, row) not in self.told for row in table.rows], dtype=bool)
+        return np.array([(table.file, row) not in self.reported for row in table.rows], dtype=bool)
 
     def is_given(self, register, owner, key):
         """Return True if a camera or an instrument has the key, with a valid or invalid value."""
@@ -132,8 +132,8 @@ def refuse_undefined(files, table, column, defined, where):
         files.log.problem(table.file, expected, row, column)
 
 
-def tell_rows(report, table, is_told, column, expected):
-    """Report the rows where `is_told` (n,) is True.
+def tell_rows(report, table, is_wrong, column, expected):
+    """Report the rows where `is_wrong` (n,) is True.
 
     If several rows are concerned because the column is missing or blank, one message is sufficient.
 
@@ -143,18 +143,18 @@ def tell_rows(report, table, is_told, column, expected):
         log.problem or log.warning.
     table : ColumnValues
         Table with n rows.
-    is_told : ndarray of bool, shape (n,)
+    is_wrong : ndarray of bool, shape (n,)
         Rows to be reported.
     column : str
         Column of the fault.
     expected : Message
         Text of the report.
     """
-    if np.count_nonzero(is_told) > 1 and table.columns.get(column) is None:
+    if np.count_nonzero(is_wrong) > 1 and table.columns.get(column) is None:
         summary = message("column_missing_or", "the column is missing or {what}", what=expected)
         report(table.file, summary, None, column)
         return
-    for place in np.flatnonzero(is_told):
+    for place in np.flatnonzero(is_wrong):
         report(table.file, expected, table.rows[place], column)
 
 

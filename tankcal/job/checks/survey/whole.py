@@ -69,7 +69,7 @@ def check_known(files):
     targets = files.tables["targets"]
     if has_rows(targets):
         refuse_repeated(targets, "point", files.log)
-        _warn_unobserved(files, targets, observed, _left_out)
+        _warn_unobserved(files, targets, observed, _unobserved_message)
     _warn_control_that_checks(files)
 
 
@@ -116,7 +116,7 @@ def _bear_on_nothing(names):
     )
 
 
-def _left_out(names):
+def _unobserved_message(names):
     return message(
         "targets_unobserved", "not observed by anything, left out: {points}", points=names
     )

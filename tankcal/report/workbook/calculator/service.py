@@ -146,7 +146,7 @@ def head_lines(table, number, label):
         f"IF(NOT(ISNUMBER({known})),#head_unknown,"
         f"IF(OR({known}<{least!r},{known}>{most!r}),#head_outside,#head_applied))"
     )
-    head = f"IF([head_state]=#head_applied,{_between(densities, known)}-[dip_volume],0)"
+    head = f"IF([head_state]=#head_applied,{_interpolation(densities, known)}-[dip_volume],0)"
     head = f'IF([head_state]=#head_outside,"{NOTHING}",{head})'
     return [
         *volumes,
@@ -155,7 +155,7 @@ def head_lines(table, number, label):
     ]
 
 
-def _between(densities, density):
+def _interpolation(densities, density):
     """Return the formula of the volume at a density, linear between densities of the record."""
     cells = ["[dip_volume]", *(f"[density_{i}]" for i in range(2, len(densities) + 1))]
     ordered = sorted(zip(densities, cells, strict=True))

@@ -51,7 +51,7 @@ def propagated(wall):
     Of (I - D G B) e - D G f, e the errors of the points and f what else the readings have.
     """
     field, by, own = wall.field, wall.radii_by_points, wall.covariance_m2.dense()
-    moved = wall.told.moved_m @ wall.told.by_readings
+    moved = wall.estimated_unknowns.moved_m @ wall.estimated_unknowns.by_readings
     kept = np.eye(by.shape[1]) - moved @ by
     other = field.covariance_m2 - by @ (by @ own).T
     return kept @ own @ kept.T + moved @ other @ moved.T
@@ -86,8 +86,8 @@ def test_a_sound_book_from_outside(sound):
 @pytest.mark.slow
 def test_what_was_told_is_off_the_hits(sound):
     """Property: the wall that they show moves none of them any more."""
-    assert sound.wall.told.largest_m < 1e-5
-    assert set(sound.sighting.told_m) == {"TS"}
+    assert sound.wall.estimated_unknowns.largest_m < 1e-5
+    assert set(sound.sighting.estimated_m) == {"TS"}
 
 
 @pytest.mark.slow
