@@ -675,30 +675,38 @@ class FieldValues:
         factor, by_columns, normal = field._factors
         free, explained = field._solution
         design = self._design(centres)
+        is_read = np.zeros(len(design), dtype=bool)
+        if spots.site is not None:
+            is_read[: len(spots)] = spots.site >= 0
+        # Only values without a reading are estimated.
+        estimated = np.flatnonzero(~is_read)
+        places, design = estimated[estimated < len(spots)], design[estimated]
         covariance = np.zeros((len(design), len(field.sites)))
         for index, component in enumerate(COMPONENTS):
             if component.shape in field.stated:
-                covariance[: len(spots)] += self._site_covariances(index)
+                covariance[: len(places)] += self._site_covariances(index, places)
         # g = X_g beta + K_g V^-1 (y - X beta), plus the subtracted mean radius of the course.
-        self.value_m = design @ free + covariance @ explained
-        self.value_m[: len(spots)] += field._mean_m[spots.course]
+        self.value_m = np.empty(len(is_read))
+        self.value_m[estimated] = design @ free + covariance @ explained
+        self.value_m[places] += field._mean_m[spots.course[places]]
         with_free = scipy.linalg.cho_solve(normal, (design - covariance @ by_columns).T).T
         covariance += with_free @ field._columns[0].T
-        self.weights = scipy.linalg.cho_solve(factor, covariance.T, check_finite=False).T
-        if spots.site is not None and np.any(spots.site >= 0):
-            self._take_as_read(np.flatnonzero(spots.site >= 0))
+        self.weights = np.empty((len(is_read), len(field.sites)))
+        self.weights[estimated] = scipy.linalg.cho_solve(factor, covariance.T, check_finite=False).T
+        if np.any(is_read):
+            self._take_as_read(np.flatnonzero(is_read))
 
     def _take_as_read(self, rows):
-        """Replace estimates by readings, less all parameters without prior except the radius."""
+        """Set values to readings, less all parameters without prior except the radius."""
         field, sites = self._field, self._spots.site[rows]
-        factor, _, normal = field._factors
+        _, by_columns, normal = field._factors
         design, radii = field._columns
         # Keep only centre and shared unknowns: the reading less these is the radius at the place.
         others = design[sites].copy()
         others[np.arange(len(rows)), radii[field.sites.course[sites]]] = 0.0
-        by_parameters = scipy.linalg.cho_solve(normal, others.T).T @ design.T
         self.value_m[rows] = field.radius_m[sites] - others @ field._solution[0]
-        self.weights[rows] = -scipy.linalg.cho_solve(factor, by_parameters.T, check_finite=False).T
+        # The parameters are N^-1 (V^-1 X)' y.
+        self.weights[rows] = -scipy.linalg.cho_solve(normal, others.T).T @ by_columns.T
         self.weights[rows, sites] += 1.0
 
     def undetermined_variances(self, rows):
