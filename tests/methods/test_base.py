@@ -50,6 +50,76 @@ def test_other_surveys_have_no_method():
     assert methods_for(None) == ()
 
 
+def run_elsewhere(program, *arguments):
+    """Last line, as JSON, of a program that finds the methods of this folder."""
+    path = os.pathsep.join([str(HERE), *filter(None, [os.environ.get("PYTHONPATH")])])
+    done = subprocess.run(
+        [sys.executable, "-c", program, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": path},
+        cwd=HERE.parents[1],
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+RUN_UPRIGHT = """
+import json, sys, tankcal
+result = tankcal.run(tankcal.load(sys.argv[1]))
+table = result.table
+tankcal.write(result, sys.argv[2], papers=False)
+print(json.dumps([table.height_m[-1], table.volume_m3[-1], table.u_m3[-1]]))
+"""
+
+
+@pytest.mark.slow
+def test_a_method_of_another_distribution_measures_an_upright_wall(tmp_path):
+    """Offsets become points: V = pi r^2 h, and a common offset of all radii adds 2 pi r h u."""
+    radius_m, u_m3 = 5.0, []
+    for name, bracket_mm in (("exact", 0), ("bracket", 20)):
+        settings = {"tank.nominal_diameter_m": 2 * radius_m, "survey.side": "inside"}
+        write_job(tmp_path / name, settings=settings)
+        (tmp_path / name / "points.csv").unlink()
+        rows = [
+            f"{azimuth},6.0,{height / 4},1000,1,{bracket_mm}\n"
+            for azimuth in range(0, 360, 15)
+            for height in range(1, 38)
+        ]
+        heading = "azimuth_deg,distance_m,height_m,offset_mm,s_mm,u_bracket_mm\n"
+        (tmp_path / name / "laser_lines.csv").write_text(heading + "".join(rows))
+        out = tmp_path / f"{name}-out"
+        height_m, volume_m3, u = run_elsewhere(RUN_UPRIGHT, tmp_path / name, out)
+        assert volume_m3 == pytest.approx(np.pi * radius_m**2 * height_m, rel=1e-6)
+        assert (out / "capacity.csv").is_file()
+        u_m3.append(u)
+    expected = 2 * np.pi * radius_m * height_m * 0.020
+    assert np.sqrt(u_m3[1] ** 2 - u_m3[0] ** 2) == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_a_table_of_another_method_is_refused(tmp_path):
+    """A method whose table has the name of a table of tankcal is named by the import."""
+    (tmp_path / "twin.dist-info").mkdir()
+    (tmp_path / "twin.dist-info" / "METADATA").write_text("Name: twin\nVersion: 1.0\n")
+    entry = "[tankcal.methods]\ntwin = laser_twin:Twin\n"
+    (tmp_path / "twin.dist-info" / "entry_points.txt").write_text(entry)
+    (tmp_path / "laser_twin.py").write_text(
+        "from tankcal.methods.base import Method\n"
+        "class Twin(Method):\n    name, kinds = 'twin', ('vertical',)\n"
+        "    def columns(self):\n        return {'plumb_lines': ()}\n"
+    )
+    program = "import tankcal.job.contract"
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(tmp_path)},
+        cwd=HERE.parents[1],
+    )
+    assert "method twin: the table plumb_lines has other columns already" in done.stderr
+
+
 @pytest.mark.slow
 def test_a_method_of_another_distribution(tmp_path):
     """An entry point is sufficient for a table of a job, a survey and its uncertainty."""
@@ -57,16 +127,7 @@ def test_a_method_of_another_distribution(tmp_path):
     write_job(tmp_path / "job", kind="sphere", settings=bare)
     (tmp_path / "job" / "points.csv").unlink(missing_ok=True)
     (tmp_path / "job" / "calipers.csv").write_text("diameter_m,s_mm\n19.998,2\n20.002,2\n")
-    path = os.pathsep.join([str(HERE), *filter(None, [os.environ.get("PYTHONPATH")])])
-    done = subprocess.run(
-        [sys.executable, "-c", RUN, str(tmp_path / "job")],
-        capture_output=True,
-        text=True,
-        env=os.environ | {"PYTHONPATH": path},
-        cwd=HERE.parents[1],
-    )
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout.splitlines()[-1])
+    found = run_elsewhere(RUN, tmp_path / "job")
     assert found["survey"] == 20.0
     assert found["volume"] == pytest.approx(np.pi / 6 * 20**3)
     # dV/dd = pi d^2 / 2; two readings of 2 mm have a mean of 2 / sqrt(2) mm

@@ -45,11 +45,16 @@ COLUMNS |= registers.COLUMNS
 _KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS
 _KEYS |= {"bottom": bottom.KEYS, "top": top.KEYS, "roof": fittings.KEYS, "ship": ship.KEYS}
 _KEYS["levels"] = uncertainty.KEYS
+_LATER = SURVEY_COLUMNS | overrulings.COLUMNS  # in the order of docs/job-format.md
 for _method in methods():
-    COLUMNS |= _method.columns()
+    _columns = _method.columns()
+    for _table, _fields in (COLUMNS | _LATER).items():
+        if _columns.get(_table, _fields) != _fields:
+            raise ValueError(f"method {_method.name}: the table {_table} has other columns already")
+    COLUMNS |= _columns
     REGISTER_KEYS |= _method.register_fields()
     _KEYS |= _method.settings()
-COLUMNS |= SURVEY_COLUMNS | overrulings.COLUMNS
+COLUMNS |= _LATER
 KEYS = {section: _KEYS[section] for section in SECTIONS}
 
 SURVEYS = ADJUSTED_SURVEYS | {
