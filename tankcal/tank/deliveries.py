@@ -283,16 +283,17 @@ def worst_deliveries(table, minimum_m):
     """
     if not minimum_m > 0:
         raise ValueError(f"minimum delivery height {minimum_m}: expected above 0")
-    prepared = _prepare(table)
+    prepared, minimum_m = _prepare(table), float(minimum_m)
+    lowest = _deliveries_of_minimum(prepared, minimum_m)
     results = [
-        _find_worst(prepared, float(minimum_m), is_relative) for is_relative in (False, True)
+        _find_worst(prepared, minimum_m, is_relative, lowest) for is_relative in (False, True)
     ]
     if results[0] is None:
         return None
     (absolute, U_bound), (relative, relative_bound) = results
-    dips = _best_at_minimum(prepared.searching(float(minimum_m), True))[1]
+    dips = _largest(prepared.searching(minimum_m, True), lowest)[1]
     return WorstDeliveries(
-        minimum_m=float(minimum_m),
+        minimum_m=minimum_m,
         absolute=absolute,
         relative=relative,
         at_minimum=None if dips is None else _build_delivery(prepared, dips),
@@ -324,13 +325,13 @@ def least_delivery_m(table, limit, is_relative=True):
     low, high = 0, int((np.ptp(heights) + SAME_M) * 1000) if len(heights) else 0
     while low < high:
         middle = (low + high) // 2
-        worst = _find_worst(prepared, max(middle, 1) / 1000, is_relative)
+        worst = _find_worst_from(prepared, max(middle, 1) / 1000, is_relative)
         if worst is None or _size_of(worst[0], is_relative) <= limit:
             high = middle
         else:
             low = middle + 1
     height_m = max(high, 1) / 1000
-    worst = _find_worst(prepared, height_m, is_relative) if len(heights) else None
+    worst = _find_worst_from(prepared, height_m, is_relative)
     return height_m if worst and _size_of(worst[0], is_relative) <= limit else None
 
 
@@ -363,13 +364,22 @@ def _prepare(table):
     return kept["search_rows"]
 
 
-def _find_worst(prepared, minimum_m, is_relative):
-    """Return (Delivery, bound) with the largest U/V, or U; None if there is no delivery."""
+def _find_worst_from(prepared, minimum_m, is_relative):
+    """Return the result of `_find_worst` for a minimum height alone."""
+    lowest = _deliveries_of_minimum(prepared, minimum_m)
+    return _find_worst(prepared, minimum_m, is_relative, lowest)
+
+
+def _find_worst(prepared, minimum_m, is_relative, lowest):
+    """Return (Delivery, bound) with the largest U/V, or U; None if there is no delivery.
+
+    The search starts from the deliveries of the minimum height, `lowest`.
+    """
     rows = prepared.rows
     if not len(rows.height_m) or np.ptp(rows.height_m) < minimum_m - SAME_M:
         return None
     search = prepared.searching(minimum_m, is_relative)
-    best, dips, bound = _branch_and_bound(search, *_best_at_minimum(search))
+    best, dips, bound = _branch_and_bound(search, *_largest(search, lowest))
     if dips is None:
         return None
     return _build_delivery(prepared, dips), float(max(bound, best * (1 + TOLERANCE)))
@@ -430,23 +440,31 @@ def _rows_for_use(table):
     return Rows(heights, volume, factor, rows.groups), pieces
 
 
-def _best_at_minimum(search):
-    """Return (size, dips) of the worst delivery of the minimum height with a dip at a row."""
-    rows, minimum_m = search.rows, search.minimum_m
+def _deliveries_of_minimum(prepared, minimum_m):
+    """Return the `Deliveries` of the minimum height with a dip at a row; None without any."""
+    rows = prepared.rows
+    if not len(rows.height_m):
+        return None
     # Each row once as the lower dip, and once as the upper dip.
     low = np.concatenate([rows.height_m, rows.height_m - minimum_m])
     high = np.concatenate([rows.height_m + minimum_m, rows.height_m])
     keep = (low >= rows.height_m[0] - SAME_M) & (high <= rows.height_m[-1] + SAME_M)
-    for start in search.pieces[1:]:
+    for start in prepared.pieces[1:]:
         gap = rows.height_m[start - 1] + SAME_M, rows.height_m[start] - SAME_M
         keep &= ~((low > gap[0]) & (low < gap[1])) & ~((high > gap[0]) & (high < gap[1]))
     if not np.any(keep):
-        return -1.0, None
+        return None
     low, high = np.clip([low[keep], high[keep]], rows.height_m[0], rows.height_m[-1])
-    result = deliveries_between(rows, search.probability, low, high, np.full(len(low), True))
-    sizes = search.size(result.U_m3, result.volume_m3)
+    return deliveries_between(rows, prepared.probability, low, high, np.full(len(low), True))
+
+
+def _largest(search, lowest):
+    """Return (size, dips) of the worst of the deliveries of the minimum height; (-1, None)."""
+    if lowest is None:
+        return -1.0, None
+    sizes = search.size(lowest.U_m3, lowest.volume_m3)
     place = int(np.argmax(sizes))
-    return sizes[place], (low[place], high[place])
+    return sizes[place], (lowest.low_m[place], lowest.high_m[place])
 
 
 @dataclass(frozen=True)
