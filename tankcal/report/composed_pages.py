@@ -209,6 +209,7 @@ class _Look:
     def __init__(self, block):
         self.block, self.style, self.widths = block, None, None
         self.glyphs, self.gaps, self.edges, self.heights = {}, {}, {}, {}
+        self.has_gaps, self.lefts = False, {}
 
     def learn(self, page, start, has_heights):
         """Read the cells of a page whose rows begin at row `start` of the table."""
@@ -229,6 +230,7 @@ class _Look:
                 self._agree(self.glyphs, letter, code)
             for i, gap in enumerate(gaps):
                 self._agree(self.gaps, text[i : i + 2], gap)
+                self.has_gaps |= gap != 0
             left, height = float(match[2]), float(match[3])
             edge = left + self._shift(x, text) - page.lefts[t]
             self._agree(self.edges, (x, missing), edge, _SAME_PT)
@@ -250,7 +252,7 @@ class _Look:
         if align == "center":
             raise UnexpectedForm
         thousandths = sum(self.widths[self.glyphs[letter]] for letter in text)
-        if self._has_gaps:
+        if self.has_gaps:
             thousandths -= sum(self.gaps[text[i : i + 2]] for i in range(len(text) - 1))
         return thousandths / 1000 * self.size
 
@@ -261,10 +263,15 @@ class _Look:
 
     def shown(self, x, text, missing):
         """Return the place of a text in its table and its glyphs, as the operators of a PDF."""
-        left = self.edges[x, missing] - self._shift(x, text)
         hexadecimal = text.translate(self._hexadecimal)
-        if not self._has_gaps:
+        if not self.has_gaps:
+            # Texts that differ in letters of equal width only have a common place.
+            form = x, missing, text.translate(self._letters_of_equal_width)
+            left = self.lefts.get(form)
+            if left is None:
+                left = self.lefts[form] = self.edges[x, missing] - self._shift(x, text)
             return left, f"<{hexadecimal}>Tj"
+        left = self.edges[x, missing] - self._shift(x, text)
         gaps = (self.gaps.get(text[i : i + 2], 0) for i in range(len(text)))
         glyphs = (f"<{hexadecimal[4 * i : 4 * i + 4]}>{-g or ''}" for i, g in enumerate(gaps))
         return left, f"[{''.join(glyphs)}]TJ"
@@ -273,9 +280,14 @@ class _Look:
     def _hexadecimal(self):
         return {ord(letter): f"{code:04X}" for letter, code in self.glyphs.items()}
 
-    @property
-    def _has_gaps(self):
-        return any(self.gaps.values())
+    @cached_property
+    def _letters_of_equal_width(self):
+        """First letter of the width of each letter, for str.translate."""
+        letters = {}
+        return {
+            ord(letter): letters.setdefault(self.widths[code], letter)
+            for letter, code in self.glyphs.items()
+        }
 
 
 def _text(cell):

@@ -126,6 +126,7 @@ def _typeset(files, blocks, timestamp, again):
             for block in blocks
         ]
         draft = _compile(files | _block_file(sampled), timestamp)
+        _forget()
         if content := compose_pages(draft, composed):
             return content
     long = any("table" in block["kind"] and len(block["rows"]) > LONG for block in blocks)
