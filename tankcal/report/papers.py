@@ -130,9 +130,11 @@ def write_papers(notebook, directory, parts, progress=None, **parameters):
         As `build` does.
     """
     from concurrent.futures import ThreadPoolExecutor
+    from contextlib import ExitStack
 
     from tankcal.report.attachments import Packed
     from tankcal.report.document import BESIDE, blocks_of, last_cell
+    from tankcal.report.folders import replace_file
     from tankcal.report.notebook import execute, notebook_text
     from tankcal.report.pdf import pdf
     from tankcal.report.web import page
@@ -141,27 +143,29 @@ def write_papers(notebook, directory, parts, progress=None, **parameters):
     total = cells + len(parts) + 2  # cells, PDFs, the notebook file and the web page
     progress = progress or (lambda done, total: None)
     ends = {name: last_cell(notebook, part) for name, part in parts}
-    pages, packed = {}, Packed()
+    pages, packed = [], Packed()
+
+    def set_pages(name, *arguments):
+        files[name].write_bytes(pdf(*arguments))
 
     def on_cell(done):
         # Start a PDF when the last cell of its part is done.
         for name, part in parts:
             if ends[name] == done:
                 is_reused = bool(part) and part not in BESIDE
-                pages[name] = pool.submit(
-                    pdf, blocks_of(notebook, part), directory, is_reused, packed
-                )
+                blocks = blocks_of(notebook, part)
+                pages.append(pool.submit(set_pages, name, blocks, directory, is_reused, packed))
         progress(done, total)
 
-    with ThreadPoolExecutor(WORKERS) as pool:  # the typesetter runs outside Python
-        execute(notebook, directory, on_cell, **parameters)
-        contents = {"report.ipynb": notebook_text(notebook).encode("utf-8")}
-        contents["report.html"] = page(blocks_of(notebook)).encode("utf-8")
-        for name, _ in parts:
-            contents[name] = pages[name].result()
-            progress(cells + len(contents), total)
-    # All files exist in memory before the first file is written.
-    for name, content in contents.items():
-        (directory / name).write_bytes(content)
-    progress(total, total)
-    return [directory / name for name in ("report.ipynb", *dict(parts), "report.html")]
+    names = ("report.ipynb", *dict(parts), "report.html")
+    with ExitStack() as stack:
+        # All files are complete before the first file receives its name.
+        files = {name: stack.enter_context(replace_file(directory / name)) for name in names}
+        with ThreadPoolExecutor(WORKERS) as pool:  # the typesetter runs outside Python
+            execute(notebook, directory, on_cell, **parameters)
+            files["report.ipynb"].write_bytes(notebook_text(notebook).encode("utf-8"))
+            files["report.html"].write_bytes(page(blocks_of(notebook)).encode("utf-8"))
+            for done, setting in enumerate(pages, cells + 3):
+                setting.result()
+                progress(done, total)
+    return [directory / name for name in names]

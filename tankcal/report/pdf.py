@@ -127,6 +127,7 @@ def _typeset(files, blocks, timestamp, again):
         ]
         draft = _compile(files | _block_file(sampled), timestamp)
         _forget()
+        return_freed_memory()
         if content := compose_pages(draft, composed):
             return content
     long = any("table" in block["kind"] and len(block["rows"]) > LONG for block in blocks)
