@@ -68,8 +68,8 @@ class Factor:
         if info:
             raise ValueError("a factor that was sound before cannot be inverted")
         # LAPACK fills the lower half in column order; its transpose is the upper half in row order.
-        inverse = np.triu(inverse.T)
-        inverse += np.triu(inverse, 1).T
+        inverse = inverse.T
+        np.copyto(inverse, inverse.T, where=np.tri(len(inverse), k=-1, dtype=bool))
         # Q2 (Q2'SQ2)^-1 Q2': each call multiplies by Q2 from the left.
         if self.tangent is not None:
             inverse = self.tangent.from_null_space(self.tangent.from_null_space(inverse).T)

@@ -12,6 +12,7 @@ import numpy as np
 from tankcal.solver.compiled import compile_functions
 
 TILE = 512  # columns multiplied at a time; the data read repeatedly fit into the cache
+SQUARE = 32  # columns mirrored at a time; both squares fit into the nearest cache
 COMPILED = ("_gather", "_add_products", "_times", "_mirror", "_propagate")
 
 
@@ -66,14 +67,14 @@ def _gather(a, first, width, place, factor):
     k, n = a.shape
     rows, count = min(3, k - first), 0
     for column in range(n):
-        is_nonzero = False
-        for row in range(rows):
-            is_nonzero = is_nonzero or a[first + row, column] != 0.0
-        if is_nonzero:
-            place[count] = column * width
-            for row in range(3):
-                factor[row, count] = a[first + row, column] if row < rows else 0.0
-            count += 1
+        x = a[first, column]
+        y = a[first + 1, column] if rows > 1 else 0.0
+        z = a[first + 2, column] if rows > 2 else 0.0
+        # Each column is written, and the next overwrites a column of zeros: a branch would be
+        # predicted wrongly at each photograph.
+        place[count] = column * width
+        factor[0, count], factor[1, count], factor[2, count] = x, y, z
+        count += (x != 0.0) | (y != 0.0) | (z != 0.0)
     # The loop over products processes four rows at a time.
     while count % 4:
         place[count] = 0
@@ -109,10 +110,11 @@ def _add_products(place, factor, count, dense, begin, length, first, out):
 
 
 def _mirror(q):
-    """Copy the upper half to the lower half, in squares of sixteen columns."""
-    n = len(q)
-    for low in range(0, n, 16):
-        for left in range(0, low + 1, 16):
-            for i in range(low, min(low + 16, n)):
-                for j in range(left, min(left + 16, i)):
-                    q[i, j] = q[j, i]
+    """Copy the upper half to the lower half, in squares of SQUARE columns."""
+    n, flat = len(q), q.reshape(q.size)
+    for low in range(0, n, SQUARE):
+        for left in range(0, low + 1, SQUARE):
+            for i in range(low, min(low + SQUARE, n)):
+                p, source = np.uintp(i * n + left), np.uintp(left * n + i)
+                for j in range(np.uintp(max(min(left + SQUARE, i) - left, 0))):
+                    flat[p + j] = flat[source + j * np.uintp(n)]
