@@ -10,7 +10,7 @@ from tankcal.geometry.circles import taubin_circle
 from tankcal.messages import message
 from tankcal.survey.results import Cause
 
-LARGEST = 10_000  # points of an adjusted survey that were verified
+LARGEST = 50_000  # points of an adjusted survey that were verified, as many as in points.csv
 
 
 @dataclass(frozen=True)

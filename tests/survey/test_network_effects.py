@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from networks import photographed
+from networks import by_total_station, photographed
 
 import tankcal.survey.network.reliability
 from tankcal.camera.model import PARAMETERS
@@ -92,6 +92,19 @@ def test_effects_in_large_surveys(datum, monkeypatch, figure):
     assert share > 0.8
     size = (large.elsewhere_m / exact.effect_m).ravel()
     figure(f"bound elsewhere over largest effect, datum {datum}", f"median {np.median(size):.1f}")
+
+
+def test_effects_between_points_in_large_surveys(monkeypatch):
+    """Second method: the response of all points to each reading."""
+    survey, truth = by_total_station()
+    point, axis = np.repeat(np.arange(0, 24, 5), 3), np.tile(np.arange(3), 5)
+    control = ControlCoordinates(truth.xyz_m[point, axis], np.full(15, 1e-4), point, axis)
+    found = adjust(replace(survey, observations=(*survey.observations, control)))
+    exact = [table.effect_m for table in found.residuals[:3]]
+    monkeypatch.setattr(tankcal.survey.network.reliability, "FEW", 0)
+    again = tankcal.survey.network.reliability.residuals_of(found.problem, found.solution)
+    for table, effect in zip(again, exact, strict=False):
+        np.testing.assert_allclose(table.effect_m, effect, rtol=1e-9)
 
 
 def test_reading_set_aside_has_no_influence():

@@ -81,7 +81,8 @@ from tankcal.survey.network.blocks import (
     test_values,
 )
 
-EXACTLY = 1e9  # products up to which effects on all points are computed, in about 0.2 s
+EXACTLY = 1e9  # products up to which effects on all points are computed, in about a second
+FEW = 1e7  # as EXACTLY, of readings between points, whose largest effects are exact in both ways
 HELD = "held coordinates"  # source of their Residuals; rows are 3 point + axis
 UNTESTED = 1e-10  # share of R'R in C'C below which R'R is rounding
 CONTRADICTED = 1e-9  # change of a condition by a release that no unknown can follow
@@ -306,27 +307,35 @@ def _changes(problem, solution, number, share):
     unweighted.fill(solution.unknowns, np.empty(jac.shape[:2]), jac)
     points = np.unique(problem.layout.points)
     points = points[points >= 0]
-    is_single_point, products = (
-        group.ties == ("point",),
-        problem.model.unknowns * max(problem.model.reduced, 1),
-    )
-    if not is_single_point or jac.shape[0] * jac.shape[1] * products <= EXACTLY:
-        largest_changes = np.zeros(jac.shape[0] * jac.shape[1])
-        for part, response in responses(solution.cofactor, columns, jac):
-            largest_changes[part] = np.abs(response[points]).max(axis=0, initial=0.0)
-        return share * largest_changes.reshape(jac.shape[:2]), None
-    # Change of the own point, exactly; the bound covers all other points.
-    nearest = np.abs(own_responses(solution.cofactor, number, jac)).max(axis=2)
-    reduced = solution.cofactor.leverage(number, jac)
-    sd = np.einsum("nii->ni", solution.cofactor.block_cofactors)
-    if solution.cofactor.datum is None:
-        reduced = reduced - own_leverage(solution.cofactor, number, jac)
-        inverse = solution.cofactor.inverse_roots
-        sd = sd - np.einsum("nji,nji->ni", inverse, inverse)
-    rest = points[points < problem.model.reduced]
-    of_rest = solution.cofactor.reduced_blocks(rest[:, None])[:, 0, 0]
-    largest = np.sqrt(max(sd.max(initial=0.0), of_rest.max(initial=0.0)))
-    return share * nearest, share * largest * np.sqrt(np.maximum(reduced, 0.0))
+    cofactor, is_single_point = solution.cofactor, group.ties == ("point",)
+    products = problem.model.unknowns * max(problem.model.reduced, 1)
+    bound, changes = None, np.zeros(jac.shape[:2])
+    inexact = np.ones(jac.shape[:2], dtype=bool)
+    most_products = EXACTLY if is_single_point else FEW
+    if jac.shape[0] * jac.shape[1] * products > most_products and (
+        is_single_point or cofactor.datum is None
+    ):
+        # Change of the own point, exactly; the bound covers all other points.
+        changes = np.abs(own_responses(cofactor, number, jac)).max(axis=2)
+        reduced = cofactor.leverage(number, jac)
+        sd = np.einsum("nii->ni", cofactor.block_cofactors)
+        if cofactor.datum is None:
+            reduced = reduced - own_leverage(cofactor, number, jac)
+            inverse = cofactor.inverse_roots
+            sd = sd - np.einsum("nji,nji->ni", inverse, inverse)
+        rest = points[points < problem.model.reduced]
+        of_rest = cofactor.reduced_blocks(rest[:, None])[:, 0, 0]
+        largest = np.sqrt(max(sd.max(initial=0.0), of_rest.max(initial=0.0)))
+        bound = largest * np.sqrt(np.maximum(reduced, 0.0))
+        if is_single_point:
+            return share * changes, share * bound
+        # Of readings between points, few can move another point more than their eliminated point.
+        has_block = (columns >= problem.model.reduced).any(axis=1)
+        inexact = (bound >= changes) | ~has_block[:, None]
+    rows, values = inexact.nonzero()
+    for part, response in responses(cofactor, columns[rows], jac[rows, values][:, None]):
+        changes[rows[part], values[part]] = np.abs(response[points]).max(axis=0, initial=0.0)
+    return share * changes, None
 
 
 def _exact_residuals(problem, solution, delta0):
