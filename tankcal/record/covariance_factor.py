@@ -19,6 +19,7 @@ from tankcal.record.schema import Finite, Saved, key
 # Largest number of rows of a block. Smaller blocks keep more rows in total; larger blocks are less
 # smooth, since they reach over a joint.
 ROWS = 200
+_PIECE = 1000  # rows of a step of array operations: 2 MB for 276 inputs, less than a cache
 RESIDUAL = 3e-15  # largest remainder of a row after the kept rows, relative to its u
 LARGEST_ERROR = 1e-14  # largest error of a combined row, relative to its u; otherwise all are kept
 
@@ -78,11 +79,21 @@ def factor_of(capacity):
         If the blocks do not match the rows and inputs of the table.
     """
     blocks, inputs = capacity["factor"], len(capacity["inputs"])
-    parts = [np.empty((0, inputs)), *(_expand_block(block, inputs) for block in blocks)]
-    factor = np.concatenate(parts)
-    if len(factor) != len(capacity["height_m"]):
-        raise ValueError(f"a factor of {len(factor)} rows, of {len(capacity['height_m'])}")
+    factor, last = np.empty((len(capacity["height_m"]), inputs)), 0
+    for part in (_expand_block(block, inputs) for block in blocks):
+        first, last = last, last + len(part)
+        if last <= len(factor):
+            factor[first:last] = part
+    if last != len(factor):
+        raise ValueError(f"a factor of {last} rows, of {len(factor)}")
     return factor
+
+
+def norms_of_rows(rows_of, count):
+    """Return the norm of each row of rows_of(slice), of `count` rows, by pieces."""
+    pieces = (slice(start, min(start + _PIECE, count)) for start in range(0, count, _PIECE))
+    norms = [np.linalg.norm(rows_of(rows), axis=1) for rows in pieces]
+    return np.concatenate([np.empty(0), *norms])
 
 
 def combinations_of(capacity):

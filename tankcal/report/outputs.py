@@ -1,6 +1,7 @@
 """All files of a run, written as a whole or not at all, and its tables as CSV files."""
 
 import csv
+import gc
 import io
 import shutil
 from collections.abc import Callable
@@ -414,6 +415,7 @@ def _write_papers(record, folder, progress, language, letterhead):
         workbook.write(record, folder / name, language, digest)
         if is_certifiable(record):
             (folder / dcc.FILE).write_bytes(dcc.certificate_xml(record, digest, language))
+    gc.collect()  # sheets and their workbook refer to each other
     build(
         folder / RECORD,
         folder,

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, ScalarFormatter
 
-from tankcal.record.covariance_factor import factor_of
+from tankcal.record.covariance_factor import factor_of, norms_of_rows
 from tankcal.report.plots.style import FAINT, INK, RED, WIDTH, set_margins, styled
 
 _SHORT_AXIS = 20  # ratio of the ends of an axis up to which minor ticks have numbers
@@ -26,7 +26,7 @@ def delivery_curve(paper):
     delivered = {
         "height": height_m[-1] - height_m[:-1],
         "volume": volume_m3[-1] - volume_m3[:-1],
-        "u": np.linalg.norm(factor[-1] - factor[:-1], axis=1),
+        "u": norms_of_rows(lambda rows: factor[-1] - factor[rows], len(factor) - 1),
     }
     below = {"height": height_m[1:], "volume": volume_m3[1:], "u": u_m3[1:]}
     deliveries = [

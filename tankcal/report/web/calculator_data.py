@@ -5,9 +5,11 @@ and as `Capacity.delivery`. The covariance factor of a long table is nearly line
 rows. The page contains only these rows.
 """
 
+from functools import partial
+
 import numpy as np
 
-from tankcal.record.covariance_factor import factor_of
+from tankcal.record.covariance_factor import factor_of, norms_of_rows
 from tankcal.report.blocks import Block
 from tankcal.report.numbers import unit
 from tankcal.report.uncertainty.capacity import ends_of_high_legs
@@ -79,7 +81,7 @@ def _deliveries(record, unit_factor):
     capacity = record["capacity"]
     factor = factor_of(capacity) * unit_factor
     height_m = np.array(capacity["height_m"])
-    largest = np.linalg.norm(factor, axis=1).max(initial=0.0)
+    largest = norms_of_rows(lambda rows: factor[rows], len(factor)).max(initial=0.0)
     rows = straight_rows(height_m, factor, BEND * largest)
     owner, dof = sources_of(record)
     least_dof = min((nu for nu in dof if nu is not None), default=None)
@@ -121,14 +123,19 @@ def straight_rows(height_m, factor, bend):
         if last - first < 2:
             continue
         part = (height_m[first : last + 1] - height_m[first]) / (height_m[last] - height_m[first])
-        line = factor[first] + part[:, None] * (factor[last] - factor[first])
-        deviation = np.linalg.norm(factor[first : last + 1] - line, axis=1)
+        ends, rows = (factor[first], factor[last] - factor[first]), factor[first : last + 1]
+        deviation = norms_of_rows(partial(_deviations, rows, part, *ends), len(rows))
         if deviation.max() > bend:
             # Split at the largest deviation, but not at an end of the piece.
             middle = first + int(np.clip(np.argmax(deviation), 1, last - first - 1))
             kept.add(middle)
             open_pieces += [(first, middle), (middle, last)]
     return np.array(sorted(kept))
+
+
+def _deviations(factor, part, start, slope, rows):
+    """Deviations of some rows of a piece of the factor from the line between its ends."""
+    return factor[rows] - (start + part[rows, None] * slope)
 
 
 def sources_of(record):
