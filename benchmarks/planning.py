@@ -45,7 +45,7 @@ def main(rounds):
     unlimited = replace(small, limits=replace(small.limits, relative_u=None))
     size = f"{rounds} rounds of {CANDIDATES} candidates"
     path = timed("plan, greedy", size, lambda: greedy(unlimited, steps=rounds, changes=candidates))
-    print(f"  {path.tried} plans tried, U/V {path.start_u:.6f} to {path.relative_u:.6f}")
+    print(f"  {path.evaluations} plans tried, U/V {path.start_u:.6f} to {path.relative_u:.6f}")
 
 
 def enlarge(path):

@@ -419,7 +419,7 @@ class SearchPath:
     steps : tuple of Effect
     prediction : Prediction
         Prediction after the last change.
-    tried : int
+    evaluations : int
         Number of plans computed.
     """
 
