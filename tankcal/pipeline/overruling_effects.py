@@ -96,9 +96,11 @@ def effect_of(job, surveyed, volume_m3, level_m, progress):
     by_search = _Attempt.of(job, (), level_m)
     effects = [Overruled(decision, *by_search.says(decision)) for decision in decisions]
     together = volume_m3 - by_search.volume_m3
+    points = surveyed.job.points
     if len(decisions) == 1:
         effects = [replace(effects[0], moved_m3=together)]
-    elif len(decisions) <= MOST_ALONE and _is_small(surveyed.job):
+    elif len(decisions) <= MOST_ALONE and (points is None or len(points.names) <= MOST_SITES):
+        # Few enough points to solve the job once more for each decision.
         for i, effect in enumerate(effects):
             remaining = (*decisions[:i], *decisions[i + 1 :])
             without = _Attempt.of(job, remaining, level_m).volume_m3
@@ -106,11 +108,6 @@ def effect_of(job, surveyed, volume_m3, level_m, progress):
     return Overrulings(
         tuple(effects), together, _list_changes(surveyed, by_search.found, decisions)
     )
-
-
-def _is_small(job):
-    """Whether the job has few enough points to solve it once more for each decision."""
-    return job.points is None or len(job.points.names) <= MOST_SITES
 
 
 @dataclass(frozen=True)

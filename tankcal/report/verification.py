@@ -236,16 +236,12 @@ def _compare_manifest(verification, folder, manifest):
             verification.tell(name, text)
             continue
         verification.add_compared(name)
-        if not verification.is_told(name) and not _is_listed(folder / name, manifest.digests[name]):
+        is_listed = (path := folder / name).is_file() and digest_of(path) == manifest.digests[name]
+        if not is_listed and not verification.is_told(name):
             text = message(
                 "verify_altered", "was altered: its SHA-256 is not the one in SHA256SUMS"
             )
             verification.tell(name, text)
-
-
-def _is_listed(path, digest):
-    """Return whether a path is a regular file with this SHA-256."""
-    return path.is_file() and digest_of(path) == digest
 
 
 def _file(verification, path, job, callbacks):

@@ -104,7 +104,9 @@ def estimate_causes(job, wall):
     along = weight @ field.means.weights
     precision = None
     estimates, noise = [], noise_of_wall(wall)
-    u_radius = np.sqrt(along @ noise @ along + _unseen_variance(field, weight))
+    # Variance of the mean radius due to the parts of the wall without readings.
+    unseen_m2 = sum(weight @ field.means.unseen(i) @ weight for i in range(len(COMPONENTS)))
+    u_radius = np.sqrt(along @ noise @ along + unseen_m2)
     # P eliminates the radii of the courses; subtracting the mean first only limits rounding.
     deviations = field.radius_m - field.radius_m.mean()
     coordinates = coordinates_of(wall.accepted)
@@ -164,11 +166,6 @@ def _mean_radius_weights(field):
     """Derivative (f,) of the mean radius of all courses by the radii at each course and level."""
     courses = len(field.outlines_m)
     return np.tile(panels([0.0, 1.0], LEVELS)[1], courses) / courses
-
-
-def _unseen_variance(field, weight):
-    """Variance of the mean radius due to the parts of the wall without readings, m2."""
-    return sum(weight @ field.means.unseen(i) @ weight for i in range(len(COMPONENTS)))
 
 
 # ---- unknowns shared by the points of a wall, as estimated with the wall, and their uncertainty
@@ -396,12 +393,11 @@ def unbound_of(points, by_points, accepted):
     accepted : ndarray of int, shape (m,)
     """
     index = coordinates_of(accepted)
-    columns = {False: [], True: []}
+    none = np.zeros((by_points.shape[0], 0))
+    columns = {False: [none], True: [none]}
     for cause in offsets_then_poses(points):
         columns[cause.what == "pose"].append(size_of(cause) * (by_points @ cause.column_m[index]))
-    return Unbound(
-        *(_stack_columns(columns[is_pose], by_points.shape[0]) for is_pose in (False, True))
-    )
+    return Unbound(*(np.column_stack(columns[is_pose]) for is_pose in (False, True)))
 
 
 def offsets_then_poses(points):
@@ -414,7 +410,3 @@ def size_of(cause):
     if cause.what != "pose":
         return 1.0
     return MOVED_M if cause.unit == "m" else TURNED_RAD
-
-
-def _stack_columns(columns, count):
-    return np.column_stack(columns) if columns else np.zeros((count, 0))

@@ -300,8 +300,12 @@ def fit(state, dips_m, volumes_m3, sd_m3):
     now, w = state, misclosure(state)
     for _ in range(MOST_ROUNDS):
         design = np.vstack([now.design(dips_m)[:, moving], rows])
+        # Linear model of the step: f = w + design x - l, with observations l = 0.
         adjusted = adjust(
-            _linear_model(w, design), np.zeros(len(moving)), np.zeros(len(w)), variances
+            lambda x, l, w=w, design=design: (w + design @ x - l, design, None),
+            np.zeros(len(moving)),
+            np.zeros(len(w)),
+            variances,
         )
         before, cost = now, w @ (w / variances)
         step = np.zeros(len(now.unknowns))
@@ -329,11 +333,6 @@ def _bulge_prior(state):
     if not len(part):
         return part, np.zeros(0), np.zeros(0)
     return part, -state.bulges_m.ravel(), prior_sds(state.bulges_m).ravel()
-
-
-def _linear_model(w, design):
-    """Linear model of a step, for `adjust`."""
-    return lambda x, l: (w + design @ x - l, design, None)
 
 
 def _priors(state):

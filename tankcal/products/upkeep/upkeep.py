@@ -113,7 +113,8 @@ def keep_up(inputs, state=NO_STATE, *, with_steps=False):
         causes=_causes(estimation),
         months=_months(estimation, steps.marks.time_ns[0], k, scale),
         watch=watched.to_save(steps.day),
-        cleaning=[_count(log, kind, entry)
+        # Times to the hour, so that no single sale shows.
+        cleaning=[saved.UpkeepCount(log, kind, entry[0], *map(_hour, entry[1:]))
                   for (log, kind), entry in sorted(inputs.findings.counts.items())],
         left_out=[
             saved.UpkeepCount("steps", REASONS[code], int(np.sum(steps.reason == code)), None, None)
@@ -396,11 +397,6 @@ def _fit_months(rows, columns):
     inverse = np.linalg.inv(normal + np.diag(prior))
     sizes = inverse @ np.append(rows[:, 1:].T @ rows[:, 0], both[0])
     return sizes[count:], inverse[count:, count:]
-
-
-def _count(log, kind, entry):
-    """`UpkeepCount` of a finding; times to the hour, so that no single sale shows."""
-    return saved.UpkeepCount(log, kind, entry[0], *map(_hour, entry[1:]))
 
 
 def _hour(time_ns):

@@ -588,18 +588,15 @@ def _best(paper, name, effects, columns):
 
 def _indispensable(paper):
     """Return the blocks of items without which the survey has no solution, with the reasons."""
-    lost = [
-        paper.word(
-            f"texts.needed_{_reason(effect.why)}", change=paper.describe_change(effect.change)
-        )
-        for effect in paper.effects
-        if effect.why and effect.change.action == "drop"
-    ]
+    lost = []
+    for effect in paper.effects:
+        if effect.why and effect.change.action == "drop":
+            defects = [
+                code for code in ("datum", "rank") if effect.why.startswith(f"{code} defect")
+            ]
+            change = paper.describe_change(effect.change)
+            lost.append(paper.word(f"texts.needed_{[*defects, 'other'][0]}", change=change))
     return [paper.paragraph("needed"), blocks.listing(lost)] if lost else []
-
-
-def _reason(why):
-    return next((code for code in ("datum", "rank") if why.startswith(f"{code} defect")), "other")
 
 
 def _rows_of_effects(paper, effects):

@@ -79,17 +79,16 @@ def groups_of(kinds, lines):
         end = next(
             (i for i, line in enumerate(remaining) if line["kind"] not in names), len(remaining)
         )
-        each = [_dof(remaining.pop(0)) for _ in range(end if len(names) == 1 else len(names))]
+        each = [
+            math.inf if (dof := remaining.pop(0)["dof"]) is None else dof
+            for _ in range(end if len(names) == 1 else len(names))
+        ]
         if len(names) == 1 and len(each) == count:
             groups += [Group(kind, column + i, column + i, dof) for i, dof in enumerate(each)]
         else:
             groups.append(Group(kind, column, column + count - 1, min(each)))
         column += count
     return groups
-
-
-def _dof(line):
-    return math.inf if line["dof"] is None else line["dof"]
 
 
 MONTE_CARLO = "monte_carlo"  # code of a Monte Carlo interval in the record
