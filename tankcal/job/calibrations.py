@@ -56,7 +56,7 @@ def read_cameras(path, warn=None, in_pixels=True):
             missing, message("no_cameras_file", "not found; expected a file with [cameras.NAME]")
         )
     log.stop_if_problems()
-    values = _values(path, log, in_pixels)
+    values = _read_entries(path, log, in_pixels)
     log.stop_if_problems()
     for warning in log.warnings if warn else ():
         warn(warning)
@@ -130,7 +130,7 @@ def choose(setups, names, file=CAMERAS_FILE):
     return tuple(setups[known.index(name)] for name in names) or tuple(setups)
 
 
-def _values(path, log, in_pixels):
+def _read_entries(path, log, in_pixels):
     """{name: {key: value}} of the file; problems go to `log`."""
     data = read_bytes(path, log, MAX_SETTINGS_BYTES)
     register = None if data is None else raw_register(path.name, data, log, "cameras")

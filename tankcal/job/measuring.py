@@ -188,7 +188,7 @@ def setups_of(table):
 
 def _readings(name, table):
     """`Readings` of one table; columns that the table lacks keep the defaults of `Readings`."""
-    value, sd = _values(name, table)
+    value, sd = _readings_in_si(name, table)
     columns, optional = table.columns, {}
     start = "at" if "at" in columns else "from"
     if start == "at":
@@ -263,7 +263,7 @@ def _correlated_readings(table):
     )
 
 
-def _values(name, table):
+def _readings_in_si(name, table):
     """(values, standard deviations) of a table of readings, in m or rad."""
     if name in ANGLES:
         return angle_in_rad(table, ANGLES[name]), table.numbers("s_arcsec") * ARCSEC

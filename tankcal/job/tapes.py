@@ -7,7 +7,7 @@ from tankcal.survey.strapping import Comparison, Obstruction, Tape
 LEAST_GAUGE_SD_M = 5e-5  # smallest standard deviation of the mean of gauge readings
 
 
-def tools_of(tables, tapes):
+def strapping_equipment(tables, tapes):
     """Tapes {name: {key: value}}, obstructions and comparisons as arguments of `Strapping`."""
     return {
         "tapes": tuple(_tape(name, given) for name, given in tapes.items()),

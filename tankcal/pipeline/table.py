@@ -110,7 +110,7 @@ def compute_table(job, survey, progress=lambda text: None, body=None):
     top = top_mark(body.highest_m - zero, spec.height_unit, closed=_is_closed(body))
     breakpoints = np.unique([edge - zero for edge in body.breakpoints_m if 0 < edge - zero < top])
     exact = _exact(body, zero)
-    heights = _rows(spec, exact, top, breakpoints)
+    heights = _choose_dips(spec, exact, top, breakpoints)
     levels = heights + zero
     volumes, areas, sources = _remove_rounding(*body.rows(levels))
     table = Capacity(
@@ -239,7 +239,7 @@ def _is_closed(body):
     return bool(areas[-1] < CLOSED * areas.max())
 
 
-def _rows(spec, exact, top_m, breakpoints_m):
+def _choose_dips(spec, exact, top_m, breakpoints_m):
     """Dips of the rows: by the requested step, or by the bound on linear interpolation."""
     step = spec.step_m
     if step is None and spec.height_unit != "m":

@@ -296,7 +296,7 @@ def _spread_targets(plan, count):
         yield members[(k * len(members)) // count]
 
 
-def _rows(plan):
+def _row_changes(plan):
     """Yield changes of target rows: drop one unless it is the last of a course, or add one."""
     targets = plan.targets
     for course in dict.fromkeys(targets.course.tolist()):
@@ -360,7 +360,7 @@ _CHANGES_OF = {
     "tape": _tapes,
     "base": _bases,
     "control_point": _control,
-    "target_row": _rows,
+    "target_row": _row_changes,
     "reading": _readings,
 }
 

@@ -297,7 +297,7 @@ def _check_ties(plan, plan_input, log):
         _check_control(plan, plan_input.control, log)
 
 
-def _rows(plan, table):
+def _tie_rows(plan, table):
     """Yield (row, end names, end positions (2, 3)) of a table for ties between known points."""
     points = plan.points
     rows = () if table is None else zip(table.rows, table.of("from"), table.of("to"), strict=True)
@@ -307,7 +307,7 @@ def _rows(plan, table):
 
 
 def _check_distances(plan, plan_input, log):
-    for row, ends, xyz in _rows(plan, plan_input.ties["distances"]):
+    for row, ends, xyz in _tie_rows(plan, plan_input.ties["distances"]):
         if why := _explain_barred_tape(plan, ends, xyz):
             log.problem("distances.csv", why, row, "to")
     for entry in plan_input.sections["tapes"]:
@@ -343,7 +343,7 @@ def _explain_barred_tape(plan, ends, xyz):
 
 
 def _check_plumb_lines(plan, plan_input, log):
-    for row, (start, end), xyz in _rows(plan, plan_input.ties["plumb_lines"]):
+    for row, (start, end), xyz in _tie_rows(plan, plan_input.ties["plumb_lines"]):
         off = np.hypot(*(xyz[1, :2] - xyz[0, :2]))
         if off > OUT_OF_PLUMB_M:
             expected = message(

@@ -238,7 +238,7 @@ def page_blocks(paper):
         blocks.key_values(_counts(paper)),
         *_false_alarms(paper),
         *_missing_jobs(paper),
-        *_rows(paper),
+        *_jobs_table(paper),
     ]
 
 
@@ -278,7 +278,7 @@ def _missing_jobs(paper):
     return [paper.paragraph("gone", names=names)]
 
 
-def _rows(paper):
+def _jobs_table(paper):
     """Return the table of the jobs, with links to their reports."""
     rows, note = paper.summary["rows"], []
     if len(rows) > MOST_ROWS:

@@ -77,7 +77,9 @@ def pages(standard, paper, language):
     for place, density in enumerate(standard.density_kg_m3):
         shown += [
             blocks.heading(density_title(paper, density)),
-            blocks.table(heads, _texts(standard, paper, place), align=["right"] * len(heads)),
+            blocks.table(
+                heads, _density_cells(standard, paper, place), align=["right"] * len(heads)
+            ),
         ]
     return shown
 
@@ -125,7 +127,7 @@ def headings(standard, paper):
     return [[paper.word("standard.dip"), "cm"], *temperatures, [paper.word("standard.U"), "m³"]]
 
 
-def _texts(standard, paper, place):
+def _density_cells(standard, paper, place):
     """Texts of the cells of a density, with the volume correction factors in the first row."""
     marks = paper.marks
     factors = [fixed(float(factor), 5, marks) for factor in standard.vcf[place]]

@@ -483,7 +483,7 @@ def readings_of(adjusted, held, held_trace):
         rows = table.rows.tolist()
         units = _units(table, trace)
         value = np.reshape(value, table.residual.shape)
-        parts_of_readings.append(_rows(table, value, trace, units, adjusted.sigma0))
+        parts_of_readings.append(_readings_of_table(table, value, trace, units, adjusted.sigma0))
         if table.source == HELD:
             continue
         # Images and control are grouped by name and unit, as a camera mixes mm and rad.
@@ -535,7 +535,7 @@ def _trace_and_values(survey, table, held_trace):
     return observations.trace, observations.value[table.rows]
 
 
-def _rows(table, value, trace, units, sigma0):
+def _readings_of_table(table, value, trace, units, sigma0):
     """Readings of a table of residuals, one for each value."""
     rows, width = table.rows.tolist(), value.shape[1]
     tau = table.w / sigma0 if sigma0 > 0 else np.full_like(table.w, np.nan)

@@ -231,13 +231,15 @@ def sight(hits, poses, estimated_m=None, incidence=None):
         scipy.linalg.block_diag(poses.covariance, np.eye(len(biases))),
     )
     points = Points(
-        names=tuple(f"{name} {row}" for name, row in zip(hits.setup, _rows(hits), strict=True)),
+        names=tuple(
+            f"{name} {row}" for name, row in zip(hits.setup, _file_rows(hits), strict=True)
+        ),
         xyz_m=xyz,
         sd_m=None,
         covariance_m2=covariance,
         section=(None,) * n,
         generatrix=(None,) * n,
-        rows=tuple(_rows(hits)),
+        rows=tuple(_file_rows(hits)),
         causes=tuple(causes),
         from_adjustment=True,
         unbound=tuple(unbound),
@@ -248,7 +250,8 @@ def sight(hits, poses, estimated_m=None, incidence=None):
     )
 
 
-def _rows(hits):
+def _file_rows(hits):
+    """Row of each hit in its file; numbers from 1 without a file."""
     return hits.rows or range(1, len(hits) + 1)
 
 

@@ -330,9 +330,9 @@ def reduce_strap(strap, tape, obstructions, shell_temperature_c, strapping, diam
 
 
 def _level_excess_bound(strapping, diameter_m):
-    """Half the bound of the excess of a tape out of level, m: the excess lies between 0 and the
-    bound.
+    """Half the bound of the excess of a tape out of level, m.
 
+    The excess lies between 0 and the bound: half the bound is its mean and its half-width.
     A plane tilted with amplitude a lengthens a tape by pi a^2 / D, a helix of height h by h^2 / (2
     C).
     """
@@ -366,8 +366,8 @@ def certified(tape, tapes, comparisons):
     true = np.array([(comparison.master_m + master.correction_m) * (1 + master.correction)
                      for comparison in many])  # fmt: skip
     sds = np.array([comparison.sd_m for comparison in many])
-    # Without declared standard deviations, use the scatter of the comparisons; 1 mm for a single
-    # one.
+    # Without declared standard deviations, use the scatter of the comparisons; of a single
+    # comparison, 1 mm.
     if np.any(sds <= 0):
         sds = np.full(len(many), np.std(true - lengths, ddof=1) if len(many) > 1 else 1e-3)
         sds = np.maximum(sds, 1e-6)
@@ -404,7 +404,7 @@ def reduce_straps(strapping, shell_temperature_c, diameter_m):
 
     Returns
     -------
-    tuple of Reduced
+    tuple of ReducedStrap
     """
     tapes = {tape.name: (tape, sd) for tape, sd in tapes_used(strapping)}
     results = []

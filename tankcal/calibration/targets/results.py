@@ -574,7 +574,7 @@ def read_names(path, log, suffixes=()):
     dict
     """
     names, first = {}, {}
-    for file, row, (number, point) in _rows(path, NAMES, log):
+    for file, row, (number, point) in _read_rows(path, NAMES, log):
         if number != int(number):
             log.problem(
                 file,
@@ -625,7 +625,7 @@ class Place:
 def read_places(path, log):
     """Read {photo: [Place]} from a CSV file with photo, point, column_px, line_px."""
     places, first = {}, {}
-    for file, row, (photo, point, column, line) in _rows(path, PLACES, log):
+    for file, row, (photo, point, column, line) in _read_rows(path, PLACES, log):
         if (photo, point) in first:
             expected = message(
                 "targets_place_twice",
@@ -666,7 +666,7 @@ def warn_of_unused(places, photos, file, log):
             log.warning(file, expected, places[photo][0].row, "photo")
 
 
-def _rows(path, fields, log):
+def _read_rows(path, fields, log):
     """Yield (file, row, values) of the valid rows; problems are logged."""
     data = read_bytes(path, log, MAX_FILE_BYTES)
     table = None if data is None else read_csv(path.name, data, ",", ".", log)

@@ -423,11 +423,11 @@ def _inside(result, zero_m):
         roof_share=roof and roof.share,
         roof_low_m=roof and roof.low_m - zero_m,
         roof_high_m=roof and roof.high_m - zero_m,
-        things=_things(inside, {item.name for item in result.job.deadwood}, zero_m),
+        things=_deadwood_entries(inside, {item.name for item in result.job.deadwood}, zero_m),
     )
 
 
-def _things(inside, declared_names, zero_m):
+def _deadwood_entries(inside, declared_names, zero_m):
     """`ThingSeen` of each proposed row of deadwood.csv."""
     from tankcal.methods.clouds.bottom import deadwood_rows
 

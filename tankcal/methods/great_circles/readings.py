@@ -15,7 +15,7 @@ from tankcal.job.checks.tapes import (
     tapes_read,
     tell_without_effect,
 )
-from tankcal.job.tapes import tools_of
+from tankcal.job.tapes import strapping_equipment
 from tankcal.messages import message
 from tankcal.survey.strapping import MOST_STRAPS, Strap, Strapping, too_many_straps
 
@@ -172,4 +172,4 @@ def make_great_circles(tables, registers):
                 row=row,
             )
         )
-    return GreatCircles(Strapping(tuple(straps), **tools_of(tables, tapes)), azimuths)
+    return GreatCircles(Strapping(tuple(straps), **strapping_equipment(tables, tapes)), azimuths)

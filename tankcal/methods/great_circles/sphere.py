@@ -111,7 +111,7 @@ class StrappedSphere:
         azimuth = self.azimuth_rad[place : place + 1]
         _, derivative = great_circle_lengths(self.fit.unknowns, azimuth)
         place_of_check = OnGreatCircles(self.places.radius_m, _normals(azimuth))
-        form = FULL_TURN**2 * _parts(place_of_check, self.variances_m2).sum(axis=0)
+        form = FULL_TURN**2 * _departure_covariances(place_of_check, self.variances_m2).sum(axis=0)
         reading = self.reduced[place]
         shared = sum(effect.by_m**2 for effect in reading.effects)
         of_fit = derivative @ self.fit.weights
@@ -122,11 +122,11 @@ class StrappedSphere:
 
     @property
     def _lengths_m2(self):
-        return FULL_TURN**2 * (noise_of(self.readings) + self._parts.sum(axis=0))
+        return FULL_TURN**2 * (noise_of(self.readings) + self._departure_covariances.sum(axis=0))
 
     @cached_property
-    def _parts(self):
-        return _parts(self.places, self.variances_m2)
+    def _departure_covariances(self):
+        return _departure_covariances(self.places, self.variances_m2)
 
     def arguments_of_part(self, plate_m, scale):
         """Arguments of `SolidPart` for the ellipsoid inside the plates; volumes are scaled."""
@@ -176,7 +176,7 @@ class StrappedSphere:
         for kind in dict.fromkeys(departure.kind for departure in self.places.departures):
             covariance = 0.0
             for size, part, departure in zip(
-                self.variances_m2, self._parts, self.places.departures, strict=True
+                self.variances_m2, self._departure_covariances, self.places.departures, strict=True
             ):
                 if departure.kind == kind:
                     cross_covariance = size * self.places.across(departure, volumes) @ weights.T
@@ -221,7 +221,9 @@ def find_strapped_sphere(job, progress):
     size = job.sphere.ovality_m or OVALITY_SHARE * radius
     prior = FormPrior(size, size)
     lengths = FULL_TURN * np.array([reading.radius_m for reading in readings])
-    covariance = FULL_TURN**2 * (noise_of(readings) + _parts(places, variances).sum(axis=0))
+    covariance = FULL_TURN**2 * (
+        noise_of(readings) + _departure_covariances(places, variances).sum(axis=0)
+    )
     fit = fit_ellipsoid(azimuth[adjusted], lengths, covariance, prior)
     return StrappedSphere(
         reduced=reduced,
@@ -258,7 +260,7 @@ def _assumed_variances(departures, form_m):
     return sizes
 
 
-def _parts(places, variances):
+def _departure_covariances(places, variances):
     """(departures, k, k) their covariances of the mean radii."""
     pairs = zip(variances, places.departures, strict=True)
     return np.array([size * places.covariance(departure) for size, departure in pairs])

@@ -19,7 +19,7 @@ from tankcal.job.checks.tapes import (
 )
 from tankcal.job.contract.observations import READINGS
 from tankcal.job.plausibility import IMPOSSIBLE_MISS
-from tankcal.job.tapes import mean_plates, metres, tools_of
+from tankcal.job.tapes import mean_plates, metres, strapping_equipment
 from tankcal.messages import message
 from tankcal.survey.strapping import MOST_STRAPS, Strap, Strapping, reduce_straps, too_many_straps
 
@@ -101,7 +101,7 @@ def make_strapping(values, tables, registers):
     tapes, keys = tapes_of(registers), values["strapping"]
     return Strapping(
         straps=_straps(table, tapes),
-        **tools_of(tables, tapes),
+        **strapping_equipment(tables, tapes),
         shape_sd_m=metres(values["shell"]["shape_sd_mm"]),
         wave_m=metres(keys["wave_mm"]),
         helix_m=metres(keys["helix_mm"]),

@@ -325,7 +325,7 @@ def outlook_of_filling(plan, metering, result, table):
         "liquid": None if metering.alone is None else join_body(metering.alone.known),
         "joint": join_body(joint),
     }
-    rows = _rows(plan, bodies, dips, table)
+    rows = _predict_dips(plan, bodies, dips, table)
     dof = result.run_dof
     return FillingOutlook(
         runs=len(plan.design.runs),
@@ -375,7 +375,8 @@ def _compute_U(body, levels, table, weights=None):
     )
 
 
-def _rows(plan, bodies, dips, table):
+def _predict_dips(plan, bodies, dips, table):
+    """`DipOutlook` of each dip: U by the wall, by the liquid and by both."""
     levels = dips + table.zero_m
     low, high = filled_range_m(plan.job.liquid)
     inside = (dips >= low - SAME_M) & (dips <= high + SAME_M)

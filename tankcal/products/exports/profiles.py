@@ -209,7 +209,7 @@ def parse_profile(file, data, log):
         stated, row = dict(settings.get(section, {})), sections.get(section)
         for (_, key), needed in (entry for entry in LISTS.items() if entry[0][0] == section):
             place = (file, f"{section}.{key}")
-            values[section, key] = _texts(*place, stated.pop(key, None), row, needed, log)
+            values[section, key] = _list_of_texts(*place, stated.pop(key, None), row, needed, log)
         read = read_section(file, section, fields, stated, row, log)
         values |= {(section, key): value for key, value in read.items()}
     tell = _Reporter(file, settings, sections, log)
@@ -219,7 +219,7 @@ def parse_profile(file, data, log):
     return _profile(file, values) if len(log.problems) == problems_before else None
 
 
-def _texts(file, name, value, row, needed, log):
+def _list_of_texts(file, name, value, row, needed, log):
     """Return a tuple of texts of a list; () without a list."""
     raw = None if value is None else value.raw
     if raw is None or raw == []:

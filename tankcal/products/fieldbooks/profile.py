@@ -118,7 +118,7 @@ def read(text, file, log, profile):
         key: heading for key, heading in profile.columns.items() if isinstance(heading, str)
     }
     first, key_of_setup = int(values.get("first_row", 1)), None
-    for row, cells in _rows(text, file, values["separator"], log):
+    for row, cells in _split_lines(text, file, values["separator"], log):
         if row < first or not any(cells) or cells[0].startswith("#"):
             continue
         if headings:
@@ -143,7 +143,7 @@ def read(text, file, log, profile):
     return book
 
 
-def _rows(text, file, separator, log):
+def _split_lines(text, file, separator, log):
     """Yield (row, cells) of each line."""
     for row, line in enumerate(text.split("\n"), 1):
         line = line.rstrip("\r")

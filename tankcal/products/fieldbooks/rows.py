@@ -129,9 +129,9 @@ def sort_readings(readings, choices, known, log, leave_out):
             others.append(reading)
     if not hits and not choices.no_hits:
         _refuse_without_hits(readings, log)
-    whole = [reading for reading in hits if None not in _values(reading.shot)]
+    whole = [reading for reading in hits if None not in _readings_of_shot(reading.shot)]
     for reading in hits:
-        if None in _values(reading.shot):
+        if None in _readings_of_shot(reading.shot):
             leave_out(message("hit_not_whole", "hits without direction, zenith angle or distance"),
                       reading)  # fmt: skip
     setups_of_hits = {reading.shot.setup for reading in whole}
@@ -139,7 +139,7 @@ def sort_readings(readings, choices, known, log, leave_out):
     return SortedReadings(tuple(whole), *targets)
 
 
-def _values(shot):
+def _readings_of_shot(shot):
     """Return direction, zenith angle and distance."""
     return shot.direction_deg, shot.zenith_deg, shot.distance_m
 

@@ -404,7 +404,9 @@ def join_heights(name, rows, places, headings):
         for row, cells in rows
         if any(place < len(cells) and has_digit(cells[place]) for place in places)
     ]
-    columns = [_values([cells[k] if k < len(cells) else None for _, cells in body]) for k in places]
+    columns = [
+        _column_numbers([cells[k] if k < len(cells) else None for _, cells in body]) for k in places
+    ]
     columns[0] = _fill_down(columns[0])
     values = np.array([[np.nan if cell is None else float(cell) for cell in c] for c in columns])
     if len(body) < 2 or _are_one_height(values[:2], sizes[:2]):
@@ -430,7 +432,7 @@ def join_heights(name, rows, places, headings):
     ), None
 
 
-def _values(cells):
+def _column_numbers(cells):
     """Numbers of a column, fractions included; None for a cell without a number."""
     style = style_of([cells])
     fractions = [number_with_fraction(cell) for cell in cells]

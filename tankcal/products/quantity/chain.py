@@ -248,7 +248,7 @@ class Transfer:
         -------
         dict of {str: Quantities}
         """
-        results = {state: _values(self.steps[state]) for state in self.gaugings}
+        results = {state: _quantity_matrix(self.steps[state]) for state in self.gaugings}
         inputs = list(self._standard_uncertainties())
         slopes = {name: self._slopes(name) for name, _ in inputs}
         contributions = {state: {} for state in self.gaugings}
@@ -378,7 +378,7 @@ class Transfer:
     def _slopes(self, name):
         """{state: derivative of each quantity by an input}, shape (n, quantities) each."""
         steps = self._evaluate({name: STEP * 1j})
-        return {state: _values(steps[state], np.imag) / STEP for state in steps}
+        return {state: _quantity_matrix(steps[state], np.imag) / STEP for state in steps}
 
     def _table_parts(self, slopes):
         """{state: [(derivatives of the quantities by a volume, factor of the volume)]}.
@@ -423,7 +423,7 @@ class Quantities:
     contributions: dict
 
 
-def _values(steps: Steps, part=np.real):
+def _quantity_matrix(steps: Steps, part=np.real):
     """Real or imaginary parts of the quantities, shape (n, quantities)."""
     return np.column_stack([part(getattr(steps, name)) for name in QUANTITIES])
 

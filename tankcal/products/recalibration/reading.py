@@ -386,7 +386,7 @@ def read_rows(path, log, sheet=None, declared=NO_UNITS, volume_column=None):
         _has_clear_units(selected, declared, log) and _has_clear_marks(selected, log)
     ):
         return None, result.report
-    rows = _rows(selected, log)
+    rows = _table_rows(selected, log)
     return (rows if len(log.problems) == problems_before else None), result.report
 
 
@@ -545,7 +545,7 @@ def _has_clear_marks(checked_table, log):
     return False
 
 
-def _rows(checked_table, log):
+def _table_rows(checked_table, log):
     """Build the `TableRows` of a table."""
     table, series, units = checked_table.table, checked_table.series, checked_table.units
     place = {float(height): k for k, height in enumerate(series.height)}

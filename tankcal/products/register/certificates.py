@@ -299,11 +299,11 @@ def _append(path, events, new=True):
         for event in events:
             _add_event(certificates, event, lambda text: log.problem(path.name, text))
         log.stop_if_problems()
-        file.write(_rows(events, data).encode())
+        file.write(_format_rows(events, data).encode())
     return list(certificates.values())
 
 
-def _rows(events, data):
+def _format_rows(events, data):
     """Return the text of new rows, in the order of the columns of the file."""
     head = data.decode("utf-8-sig", errors="replace").partition("\n")[0]
     separator = ";" if head.count(";") > head.count(",") else ","

@@ -200,7 +200,7 @@ def pages(paper, folder=None, whole=False):
         *_deliveries(paper),
         *_courses(paper),
         *_estimated_values(paper),
-        *_rows(paper, whole),
+        *_select_rows(paper, whole),
     ]
 
 
@@ -632,7 +632,7 @@ def _printed_unit(entry):
 # ---- rows
 
 
-def _rows(paper, whole):
+def _select_rows(paper, whole):
     """Return a selection of the rows, or all rows if `whole` and if the page has space for them.
 
     The table has one column of the page, so that the last column never contains only a few rows.

@@ -314,7 +314,7 @@ def find_one_sided_losses(readings, known):
     things = defaultdict(lambda: [0, 0])
     rows = (used.columns[name].tolist() for name in ("kind", "file", "ids", "removed"))
     for *identity, removed in zip(*rows, strict=True):
-        for thing in _things(*identity, known):
+        for thing in _dependencies(*identity, known):
             things[thing][0] += 1
             things[thing][1] += removed
     suspects = []
@@ -334,7 +334,7 @@ def find_one_sided_losses(readings, known):
     ]
 
 
-def _things(kind, file, ids, known):
+def _dependencies(kind, file, ids, known):
     """Yield (file, name) of the items on which a value depends."""
     if kind == "image coordinate":
         yield file, ids[0]

@@ -45,7 +45,7 @@ def check_readings(adjusted, checks, cov_scale):
             else [observations]
         )
         for part in parts:
-            readings += _rows(adjusted, part, cov_scale)
+            readings += _reading_rows(adjusted, part, cov_scale)
     return readings
 
 
@@ -88,7 +88,7 @@ def find_disagreeing_checks(check_points, table):
     return problems[:LISTED]
 
 
-def _rows(adjusted, observations, cov_scale):
+def _reading_rows(adjusted, observations, cov_scale):
     """Reading rows of one table, without observations of points that are not adjusted."""
     ties = [np.asarray(getattr(observations, name)) for name in observations.ties]
     is_adjusted = np.isfinite(adjusted.xyz_m[np.array(ties)]).all(axis=(0, 2))

@@ -26,7 +26,7 @@ AS_IF_FIXED = 1e4  # weight of a fixed unknown as a row: as if known to 0.1 mm
 
 def directions(layout, state):
     """The seven directions (unknowns, 7) at a state; fixed unknowns are omitted."""
-    return _together(layout, _parts(layout, state))[:-1]
+    return _together(layout, _datum_derivatives(layout, state))[:-1]
 
 
 def _together(layout, parts):
@@ -38,7 +38,7 @@ def _together(layout, parts):
     return whole
 
 
-def _parts(layout, state):
+def _datum_derivatives(layout, state):
     """Yield columns (...) of each kind of unknown with their derivatives (..., 7)."""
     derivatives = _derivatives(state)
     for name in ("points", "photos"):
@@ -106,7 +106,7 @@ def null_space(problem, unfelt=UNFELT, fixed=True, state=None, count=None):
     """
     layout, state = problem.layout, problem.state if state is None else state
     idle = _idle(problem)
-    parts = [*_parts(layout, state)]
+    parts = [*_datum_derivatives(layout, state)]
     whole = _together(layout, parts)
     felt, lengths = [np.zeros((1, 7))], np.zeros(len(whole))
     for observations, weight in _feeling(problem):
@@ -118,7 +118,7 @@ def null_space(problem, unfelt=UNFELT, fixed=True, state=None, count=None):
         jac *= weight
         ways = whole
         if undisturbed is not state:
-            ways = _together(layout, _parts(layout, undisturbed))
+            ways = _together(layout, _datum_derivatives(layout, undisturbed))
         moved = np.einsum("nmk,nkd->nmd", jac, ways[columns]).reshape(-1, 7)
         # The triangular factor keeps the singular values of the rows, at size 7 x 7.
         felt.append(np.linalg.qr(moved, mode="r"))

@@ -129,7 +129,7 @@ def _distances(xyz, a, b):
     return np.maximum(np.linalg.norm(xyz[a] - xyz[b], axis=1), 1e-12)
 
 
-def _rows(xyz, a, b):
+def _distance_derivatives(xyz, a, b):
     """Derivatives (n, points dims) of distances, and the distances (n,)."""
     d, s = xyz[a] - xyz[b], _distances(xyz, a, b)
     jac = np.zeros((len(a), *xyz.shape))
@@ -146,7 +146,7 @@ def _fit_places(xyz, a, b, length):
         return max(3 * float(np.median(np.abs(off))), 1e-9 * float(length.max()))
 
     def step_at(xyz, damping):
-        jac, distance = _rows(xyz, a, b)
+        jac, distance = _distance_derivatives(xyz, a, b)
         off = distance - length
         weight = 1 / (1 + (off / scale_of(off)) ** 2)
         normal = (jac * weight[:, None]).T @ jac
@@ -174,7 +174,7 @@ def _fit_places(xyz, a, b, length):
 def _rigid(xyz, a, b):
     """Whether the distances determine the shape of the network."""
     n, dims = xyz.shape
-    singular = np.linalg.svd(_rows(xyz, a, b)[0], compute_uv=False)
+    singular = np.linalg.svd(_distance_derivatives(xyz, a, b)[0], compute_uv=False)
     # All coordinates except the rigid motions, dims (dims + 1) / 2.
     rank = n * dims - dims * (dims + 1) // 2
     return len(singular) >= rank and singular[rank - 1] > LOOSE * singular[0]
