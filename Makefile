@@ -57,7 +57,7 @@ notebooks: $(VENV)/full ## execute every notebook, top to bottom
 	  sh -c '../$(BIN)/jupyter nbconvert --to notebook --execute --output-dir ../build/notebooks/$$(dirname {}) {}'
 
 job-format: $(VENV)/full ## fill the tables of docs/job-format.md from the contract of the job
-	$(BIN)/python -m tankcal.job.starter.page docs/job-format.md
+	$(BIN)/python -m tankcal.job.starter.texts docs/job-format.md
 	$(BIN)/python tests/support/plausible_page.py
 
 schemas: $(VENV)/full ## write the JSON schemas of what is saved and docs/saved-keys.md

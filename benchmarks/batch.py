@@ -146,8 +146,7 @@ def measure_settled(count):
     """Print what a batch costs that has nothing to compute."""
     from tankcal.products.batch.finding import BatchJob
     from tankcal.products.batch.journal import compute_keys
-    from tankcal.products.batch.options import Options
-    from tankcal.products.batch.outcomes import load_outcome, save_outcome
+    from tankcal.products.batch.outcomes import Options, load_outcome, save_outcome
 
     with tempfile.TemporaryDirectory() as folder:
         jobs, out, links = (Path(folder) / name for name in ("jobs", "out", "links"))
@@ -200,7 +199,7 @@ def measure_sleeping(rows, workers, seconds):
     from tankcal.products.batch import running
     from tankcal.products.batch.finding import BatchJob
     from tankcal.products.batch.journal import open_folder
-    from tankcal.products.batch.options import Options
+    from tankcal.products.batch.outcomes import Options
     from tankcal.products.batch.steps import Task
 
     options, held = Options(), []

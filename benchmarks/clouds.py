@@ -26,7 +26,7 @@ from tankcal.clouds import describe_cloud
 from tankcal.clouds.wall import find_cloud_wall
 from tankcal.methods.clouds.passes import Placing, Reading, Telling, open_passes
 from tankcal.methods.clouds.readings import CloudFile
-from tankcal.survey.scans import ScanSetup
+from tankcal.survey.registration import ScanSetup
 from tankcal.survey.wall_hits import RangingInstrument
 
 BLOCK = 1_000_000

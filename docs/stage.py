@@ -38,7 +38,6 @@ REFERENCE = {  # {title: modules of a page of the reference}, in the order of th
         f"tankcal.geometry.{name}"
         for name in (
             "circles",
-            "cylinders",
             "primitives",
             "outlines",
             "field.components",

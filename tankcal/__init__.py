@@ -22,8 +22,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:  # what a type checker reads; nothing of it runs
     from tankcal.errors import HeightError, InputError, SolutionError, TankcalError
     from tankcal.job import Job, load
-    from tankcal.pipeline.chain import adjust_job, run
-    from tankcal.pipeline.result import Result
+    from tankcal.pipeline.chain import Result, adjust_job, run
     from tankcal.products.linter.linting import lint
     from tankcal.products.quantity.ticketing import ticket
     from tankcal.report.outputs import write
@@ -37,7 +36,7 @@ _MODULE_OF = {
     "Job": "job",
     "run": "pipeline.chain",
     "adjust_job": "pipeline.chain",
-    "Result": "pipeline.result",
+    "Result": "pipeline.chain",
     "Adjustment": "survey",
     "plot": "report.plots.views",
     "write": "report.outputs",

@@ -18,7 +18,7 @@ import tankcal
 from tankcal.cli import main
 from tankcal.pipeline.chain import adjust_job
 from tankcal.record import record_of, record_of_adjustment, save
-from tankcal.terminal.showing import speak
+from tankcal.terminal import speak
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLE = ROOT / "examples" / "silva-1995"

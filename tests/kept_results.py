@@ -10,8 +10,8 @@ from pathlib import Path
 
 from schemas import keys_in
 
-from tankcal.record.camera_versions import CAMERA
 from tankcal.record.plan import PLAN
+from tankcal.record.versions import CAMERA
 
 KEPT = Path(__file__).with_name("kept")
 FREE = (

@@ -14,18 +14,20 @@ import tankcal
 from tankcal.errors import Problem, TankcalError, reason_of
 from tankcal.messages import message, printable_lines
 from tankcal.products.base import find_module, products, refusals
-from tankcal.terminal.showing import (
+from tankcal.terminal import (
     complain,
     failure,
+    is_out_of_memory,
     language_of_run,
     prepare_for_small_work,
     print_json,
+    raise_at_signals,
     say,
     say_in_language,
+    signal_status,
     speak,
     words_of_run,
 )
-from tankcal.terminal.stopping import is_out_of_memory, raise_at_signals, signal_status
 
 DESCRIPTION = """\
 tankcal calibrates storage tanks: from a survey of the wall to the capacity table with

@@ -2,7 +2,7 @@
 
 from tankcal.cli import camera_runs as runs
 from tankcal.messages import message
-from tankcal.terminal.arguments import (
+from tankcal.terminal import (
     add_language,
     parse_count,
     parse_positive,

@@ -7,14 +7,7 @@ from pathlib import Path
 import tankcal
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message, printable
-from tankcal.terminal.showing import (
-    Progress,
-    language_of_run,
-    print_paths,
-    say,
-    speak,
-    warn,
-)
+from tankcal.terminal import Progress, language_of_run, print_paths, say, speak, warn
 
 HEAD_BYTES = 200  # start of a file that identifies a record
 
@@ -24,7 +17,7 @@ def parameters(options):
     from tankcal.calibration.interiors import count_sets
     from tankcal.calibration.parameters.analysis import analyse_job, analyse_record
     from tankcal.calibration.parameters.judgement import Choices
-    from tankcal.record.camera_parameters import plain_parameters
+    from tankcal.record.camera import plain_parameters
 
     show = _start(options)
     choices = Choices(
@@ -51,7 +44,7 @@ def compare(options):
     from tankcal.calibration.stability.comparison import compare as compare_calibrations
     from tankcal.calibration.stability.fits import parse_grid, parse_terrain
     from tankcal.job.calibrations import choose, read_cameras, with_pixels
-    from tankcal.record.camera_analyses import plain_stability, summary
+    from tankcal.record.camera import plain_stability, summary
 
     show = _start(options)
     warnings = []
@@ -78,7 +71,7 @@ def influence(options):
     """Compare the adjustments of one survey with several calibrations."""
     from tankcal.calibration.influence.runs import influence as compute_influence
     from tankcal.job.calibrations import read_cameras
-    from tankcal.record.camera_analyses import plain_influence
+    from tankcal.record.camera import plain_influence
 
     show = _start(options)
     warnings = []
@@ -98,10 +91,10 @@ def influence(options):
 
 def check(options):
     """Evaluate differences at check points with a table of limits."""
-    from tankcal.calibration.product import check as limits
-    from tankcal.calibration.product.check import check_product
+    from tankcal.calibration import product as limits
+    from tankcal.calibration.product import check_product
     from tankcal.calibration.product.differences import collect_differences, read_differences
-    from tankcal.record.camera_analyses import plain_product
+    from tankcal.record.camera import plain_product
 
     show = _start(options)
     table = limits.read_limits(options.limits) if options.limits else limits.shipped_limits()
@@ -323,7 +316,7 @@ def _start(options):
 
 def _load_job(source, show, language):
     """Return the job, with its tank if it has one."""
-    from tankcal.terminal.showing import read_job_language
+    from tankcal.terminal import read_job_language
 
     language = language or read_job_language(source)
     if language is not None:

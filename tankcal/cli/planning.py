@@ -4,10 +4,13 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem, SolutionError, TankcalError
 from tankcal.messages import message
-from tankcal.terminal.arguments import add_language, parse_count, parse_several, parse_share
-from tankcal.terminal.showing import (
+from tankcal.terminal import (
     Progress,
+    add_language,
     marks,
+    parse_count,
+    parse_several,
+    parse_share,
     print_paths,
     say,
     speak,
@@ -90,9 +93,9 @@ def _plan(options):
         return
     from tankcal.planning import load_plan, predict
     from tankcal.planning.improvements import smallest, what_helps
-    from tankcal.planning.wall.model import WallPlan
+    from tankcal.planning.model import WallPlan
     from tankcal.report import planning as planning_papers
-    from tankcal.terminal.showing import read_plan_language
+    from tankcal.terminal import read_plan_language
 
     speak(options.language or read_plan_language(options.plan))
     _refuse_idle(options)
@@ -591,8 +594,8 @@ def _network_item(item, name):
 
 def _wall_item(change):
     """Return an item of a plan of the wall in words; None for other plans."""
+    from tankcal.planning.model import WallPlan
     from tankcal.planning.wall.changes import NUMBERED
-    from tankcal.planning.wall.model import WallPlan
 
     name = change.name
     if change.item in NUMBERED:

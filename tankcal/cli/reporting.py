@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from tankcal.terminal.arguments import add_letterhead, read_letterhead
-from tankcal.terminal.showing import Progress, print_paths, speak
+from tankcal.terminal import Progress, add_letterhead, print_paths, read_letterhead, speak
 from tankcal.text.shipped import LANGUAGES
 
 

@@ -6,15 +6,17 @@ import tankcal
 from tankcal.errors import InputError, Problem, SolutionError, problem_of
 from tankcal.job.certificate_entries import missing_entries
 from tankcal.messages import message
-from tankcal.terminal.arguments import add_letterhead, parse_cluster, read_letterhead
-from tankcal.terminal.showing import (
+from tankcal.terminal import (
     Progress,
     add_json,
+    add_letterhead,
     marks,
+    parse_cluster,
     print_doubts,
     print_json,
     print_paths,
     read_job,
+    read_letterhead,
     say,
     warn,
 )
@@ -161,7 +163,7 @@ def _complete_by_letterhead(warnings, job, letterhead):
     """Return the warnings, without missing entries of the certificate that a letterhead states."""
     if letterhead is None:
         return warnings
-    from tankcal.pipeline.checks.survey import incomplete_certificate
+    from tankcal.pipeline.checks import incomplete_certificate
 
     others = [
         warning
@@ -180,7 +182,7 @@ def _idle_cluster(cluster, clouds=None):
 
 
 def _find_doubts(warnings):
-    from tankcal.job.plausibility_table import CODES
+    from tankcal.job.plausibility import CODES
 
     return [warning for warning in warnings if getattr(warning.expected, "code", None) in CODES]
 

@@ -4,7 +4,7 @@ import shlex
 from pathlib import Path
 
 from tankcal.messages import message, printable
-from tankcal.terminal.showing import language_of_run, say, speak
+from tankcal.terminal import language_of_run, say, speak
 from tankcal.text.shipped import LANGUAGES
 
 USUAL_KIND = "vertical"

@@ -4,14 +4,7 @@ from dataclasses import asdict
 
 from tankcal.errors import problem_of
 from tankcal.messages import message, printable
-from tankcal.terminal.arguments import add_language
-from tankcal.terminal.showing import (
-    Progress,
-    add_json,
-    print_json,
-    say,
-    speak_of_record,
-)
+from tankcal.terminal import Progress, add_json, add_language, print_json, say, speak_of_record
 
 
 def add(commands):

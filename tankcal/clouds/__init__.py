@@ -9,10 +9,18 @@ import time
 
 import numpy as np
 
-from tankcal.clouds.contents import WHOLE, CloudChunk, CloudHeader, CloudPiece, ScanHeader
 from tankcal.clouds.formats import describe_file, divide_file, read_pieces
 from tankcal.clouds.formats.columns import estimate_rows
-from tankcal.clouds.formats.files import EXTENT_LIMIT, count_mismatch, open_cloud
+from tankcal.clouds.formats.files import (
+    EXTENT_LIMIT,
+    WHOLE,
+    CloudChunk,
+    CloudHeader,
+    CloudPiece,
+    ScanHeader,
+    count_mismatch,
+    open_cloud,
+)
 from tankcal.errors import reason_of
 from tankcal.messages import message
 

@@ -6,7 +6,6 @@ simulates. The public interface to the law of propagation, degrees of freedom, k
 `tankcal.uncertainty`.
 """
 
-from tankcal.gum.combination import Combination
-from tankcal.gum.distributions import expanded, standard, vector, within
+from tankcal.gum.distributions import Combination, expanded, standard, vector, within
 
 __all__ = ["Combination", "expanded", "standard", "vector", "within"]

@@ -46,8 +46,9 @@ def make_measurements(values, tables, registers):
         for name, given in registers["cameras"].items()
     )
     images, fits = _image_points(tables, registers["cameras"], values["adjustment"])
+    datum_points = tuple(map(datum_point, values["adjustment"]["datum_points"] or ()))
     return Measurements(
-        settings=_settings(values["adjustment"]),
+        settings=structure(AdjustmentSettings, values["adjustment"], datum_points=datum_points),
         cameras=cameras,
         photos=_photos(tables["photos"], images),
         image_points=images,
@@ -70,11 +71,6 @@ def make_measurements(values, tables, registers):
 
 def _has_rows(table):
     return table is not None and len(table.rows) > 0
-
-
-def _settings(given):
-    points = tuple(datum_point(text) for text in given["datum_points"] or ())
-    return structure(AdjustmentSettings, given, datum_points=points)
 
 
 def _nominal(values):

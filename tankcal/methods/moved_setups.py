@@ -24,7 +24,7 @@ from tankcal.adjust import noncentrality
 from tankcal.geometry.field.amplitudes import estimate_amplitudes
 from tankcal.geometry.field.blunders import restricted_precision
 from tankcal.geometry.field.sites import free_design
-from tankcal.pipeline.checks.survey import limit_at
+from tankcal.pipeline.checks import limit_at
 from tankcal.pipeline.checks.wall import girth_m
 from tankcal.pipeline.wall.shared_unknowns import noise_of_wall
 

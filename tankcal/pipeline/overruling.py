@@ -159,18 +159,13 @@ def refuse_kept_readings(job, adjustment):
         reading_key = files.get(decision.table), decision.reading_row
         if decision.table is None or not decision.is_kept or reading_key in adjusted:
             continue
-        text = _not_adjusted(
-            decision, is_tried=reading_key in _initial_readings(adjustment.adjusted.survey)
-        )
+        tables = adjustment.adjusted.survey.tables.values()
+        traces = [table.trace for table in tables if table.trace is not None]
+        tried = {(trace.file, row) for trace in traces for row in trace.rows}
+        text = _not_adjusted(decision, is_tried=reading_key in tried)
         problems.append(Problem(decision.file, text, decision.row, "row"))
     if problems:
         raise InputError(problems)
-
-
-def _initial_readings(survey):
-    """Set of (file, row) of all readings at the start of an adjustment."""
-    traces = [table.trace for table in survey.tables.values() if table.trace is not None]
-    return {(trace.file, row) for trace in traces for row in trace.rows}
 
 
 def _not_adjusted(decision, *, is_tried):

@@ -19,7 +19,6 @@ import scipy.sparse
 
 from tankcal.adjust import SD_OVER_MEDIAN
 from tankcal.errors import InputError, Problem, SolutionError
-from tankcal.geometry.cylinders import FittedCylinder, cylinder_distances, lying_cylinder
 from tankcal.geometry.field.places import (
     DEGREES,
     MOST_SITES,
@@ -34,10 +33,17 @@ from tankcal.geometry.field.places import (
     means_of_neighbours,
     wet_cells,
 )
-from tankcal.geometry.primitives import fit_sphere, sphere_distances, unit_vectors
+from tankcal.geometry.primitives import (
+    FittedCylinder,
+    cylinder_distances,
+    fit_sphere,
+    lying_cylinder,
+    sphere_distances,
+    unit_vectors,
+)
 from tankcal.messages import message
+from tankcal.pipeline.checks import noise_is_estimated, origin_of
 from tankcal.pipeline.checks.size import refuse_misfit
-from tankcal.pipeline.checks.survey import noise_is_estimated, origin_of
 from tankcal.pipeline.overruling import decisions_of, refuse_kept
 from tankcal.pipeline.tanks.solid import factor_of_unseen, solid_as_surveyed
 from tankcal.pipeline.wall.surveyed import given_covariance
@@ -386,9 +392,11 @@ def fit_scan(job, dof=np.inf):
     is_used, is_kept = decided >= 0, decided > 0
     for _ in range(MOST_SEARCHES):
         fit, names, values, by_shape, residuals = _fit_or_refuse(job, is_used)
-        is_near = (
-            (_near(residuals, is_used) | is_kept) & (decided >= 0) if job.snooping else is_used
-        )
+        is_near = is_used
+        if job.snooping:
+            robust_sd = SD_OVER_MEDIAN * np.median(np.abs(residuals[is_used]))
+            is_near = np.abs(residuals) <= FAR * max(robust_sd, 1e-6)
+            is_near = (is_near | is_kept) & (decided >= 0)
         if np.array_equal(is_near, is_used):
             break
         is_used = is_near
@@ -451,12 +459,6 @@ def _fit_or_refuse(job, is_used):
             message("no_wall", "no wall was found in the points: {error}", error=error.args[0]),
         )
         raise InputError(problem) from error
-
-
-def _near(residuals, is_used):
-    """Mask of the points within `FAR` robust standard deviations of the shape."""
-    robust_sd = SD_OVER_MEDIAN * np.median(np.abs(residuals[is_used]))
-    return np.abs(residuals) <= FAR * max(robust_sd, 1e-6)
 
 
 def _covariance(points, index):

@@ -15,8 +15,8 @@ from tankcal.job.model import Job
 from tankcal.job.tables import in_book
 from tankcal.messages import message
 from tankcal.methods.base import completing_method, given_methods
+from tankcal.pipeline.checks import refuse_undetermined
 from tankcal.pipeline.checks.size import is_within_wall, refuse_other_side, refuse_other_size
-from tankcal.pipeline.checks.survey import refuse_undetermined
 from tankcal.pipeline.overruling import refuse_kept_readings, with_decided_readings
 from tankcal.pipeline.wall.surveyed import s_transform
 

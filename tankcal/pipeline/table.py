@@ -13,8 +13,8 @@ from tankcal.geometry.field.sites import MOST_SITES
 from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import message
 from tankcal.methods.base import accompanying_methods, given_methods, method_of
+from tankcal.pipeline.checks import compare_with_nominal, warn_of_undeclared
 from tankcal.pipeline.checks.size import check_reference, check_scan, check_size, check_wall
-from tankcal.pipeline.checks.survey import compare_with_nominal, warn_of_undeclared
 from tankcal.pipeline.tanks import body_of, critical_zone, zero_height
 from tankcal.solver.compiled import threads_for
 from tankcal.tank.body import Body
@@ -528,7 +528,9 @@ def _worst(job, table):
         height_m: worst_deliveries(
             table, min(height_m, height) if height_m <= round(height, 3) else height_m
         )
-        for height_m in _minima(job)
+        for height_m in sorted(
+            MINIMA_M if job.table.minimum_delivery_m is None else job.table.minimum_delivery_m
+        )
     }
     if job.table.minimum_delivery_m is not None:
         problems = [
@@ -579,12 +581,6 @@ def _refuse_outside(job, table):
     ]
     if problems:
         raise InputError(problems)
-
-
-def _minima(job):
-    """Minimum delivery heights of the job in ascending order, or the default heights, m."""
-    heights_m = job.table.minimum_delivery_m
-    return MINIMA_M if heights_m is None else tuple(sorted(heights_m))
 
 
 def _quarters(table):

@@ -14,7 +14,7 @@ from tankcal.errors import TankcalError
 from tankcal.messages import message
 from tankcal.planning.assembly import tape_of
 from tankcal.planning.measurements import measurements_of, nominal_of
-from tankcal.planning.model import ControlPoint, Plan
+from tankcal.planning.model import ControlPoint, Plan, WallPlan
 from tankcal.planning.places import (
     find_visible,
     group_by_ends,
@@ -27,7 +27,6 @@ from tankcal.planning.position_checks import refuse_misplaced
 from tankcal.planning.prediction import Prediction, predict
 from tankcal.planning.table import predict_table, recompute_table, relative_u_of
 from tankcal.planning.wall.changes import SEARCHED, WALL_ITEMS, wall_changes_of, wall_count
-from tankcal.planning.wall.model import WallPlan
 from tankcal.survey import predict_survey
 
 ITEMS = ("photo_station", "setup", "tape", "base", "control_point", "target_row", "reading")

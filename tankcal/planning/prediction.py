@@ -8,12 +8,12 @@ import numpy as np
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import list_some, message
-from tankcal.pipeline.checks.survey import SHOWN, VAGUE, check_bases, open_questions
+from tankcal.pipeline.checks import SHOWN, VAGUE, check_bases, open_questions
 from tankcal.pipeline.checks.wall import OF_SCATTER
 from tankcal.pipeline.table import check_table
 from tankcal.planning.contract import PLAN_FILE
 from tankcal.planning.measurements import measurements_of, nominal_of
-from tankcal.planning.model import Plan
+from tankcal.planning.model import Plan, WallPlan
 from tankcal.planning.places import (
     Visibility,
     describe_separate_bodies,
@@ -28,7 +28,6 @@ from tankcal.planning.table import (
     predict_table,
     refuse_without_delivery,
 )
-from tankcal.planning.wall.model import WallPlan
 from tankcal.planning.wall.prediction import predict_wall
 from tankcal.survey import Predicted, predict_survey
 from tankcal.survey.network.quality import precision

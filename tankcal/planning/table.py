@@ -22,7 +22,7 @@ from tankcal.adjust import UNCONTROLLED, noncentrality
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.model import Job
 from tankcal.messages import message
-from tankcal.pipeline.checks.survey import refuse_undetermined
+from tankcal.pipeline.checks import refuse_undetermined
 from tankcal.pipeline.table import MINIMA_M, ComputedTable, compute_table, statements
 from tankcal.pipeline.tanks.vertical import volume_by_points
 from tankcal.pipeline.wall.finding import find_wall
@@ -259,14 +259,10 @@ def single_readings(plan, observations):
     count = np.array([times.get(ids[0], 1) for ids in trace.ids])
     turn = np.zeros(len(count))
     if trace.table == "directions":
-        turn = (1.0 - 1.0 / count) * _share_of_set(observations)  # (1 - 1/n) q
+        weight = observations.using(np.ones(len(observations))).weight[:, 0] ** 2
+        share_of_set = weight / np.bincount(observations.set, weight)[observations.set]
+        turn = (1.0 - 1.0 / count) * share_of_set  # (1 - 1/n) q
     return SingleReadings(np.arange(len(count)), 1.0 / count, count, turn)
-
-
-def _share_of_set(directions):
-    """Share (n,) of each direction in the weight of its set."""
-    weight = directions.using(np.ones(len(directions))).weight[:, 0] ** 2
-    return weight / np.bincount(directions.set, weight)[directions.set]
 
 
 def _single_ties(plan, observations):

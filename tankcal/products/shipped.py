@@ -56,14 +56,14 @@ class Cameras(Product):
         }
 
     def saved_types(self):
-        from tankcal.record import camera_analyses, camera_parameters
-        from tankcal.record.camera_versions import CAMERA
+        from tankcal.record import camera
+        from tankcal.record.versions import CAMERA
 
         return (
-            (CAMERA, "stability", camera_analyses.StabilityFile),
-            (CAMERA, "parameters", camera_parameters.ParametersFile),
-            (CAMERA, "influence", camera_analyses.InfluenceFile),
-            (CAMERA, "product", camera_analyses.ProductFile),
+            (CAMERA, "stability", camera.StabilityFile),
+            (CAMERA, "parameters", camera.ParametersFile),
+            (CAMERA, "influence", camera.InfluenceFile),
+            (CAMERA, "product", camera.ProductFile),
         )
 
 

@@ -1,8 +1,9 @@
-"""Versions of the record, and the migration of older versions."""
+"""Versions of the record and of camera.json, and the migration of older versions."""
 
 from tankcal.record.columns import columns_of
 from tankcal.record.covariance_factor import wrap_factor
 from tankcal.record.saved_formats import SavedFormat
+from tankcal.record.schema import Saved, key
 
 VERSION = 2
 _READING = (  # columns of readings
@@ -63,3 +64,28 @@ RECORD = SavedFormat(
 )
 FORMAT = RECORD.format
 migrated, version_of = RECORD.migrated, RECORD.version_of
+
+CAMERA_KINDS = ("stability", "parameters", "influence", "product")
+
+
+def _migrate_camera_1(result):
+    """Convert version 1 to 2; comparisons of version 1 have a single terrain and no scatter."""
+    result = result | {"format": "tankcal-camera/2"}
+    if result["kind"] != "stability":
+        return result
+    terrain = result["terrain"] and {"terrains": 1} | result["terrain"]
+    pairs = [{"scatter_px": None} | pair for pair in result["pairs"]]
+    random = {"terrain_random": {"terrains": 1}}
+    conventions = [random.get(choice["code"], {}) | choice for choice in result["conventions"]]
+    return result | {"terrain": terrain, "pairs": pairs, "conventions": conventions}
+
+
+CAMERA = SavedFormat("tankcal-camera", 2, "camera.json", {1: _migrate_camera_1}, CAMERA_KINDS)
+
+
+class CameraFile(Saved, kw_only=True):
+    """Keys common to all kinds of camera.json."""
+
+    format: str = key("see Versions", default=CAMERA.format)
+    kind: str = key("one of: " + ", ".join(CAMERA_KINDS))
+    made_from: dict | None = key("files, version and job", optional=True, default=None)

@@ -7,7 +7,7 @@ listed as missing.
 from math import hypot
 
 from tankcal.job.certificate_entries import missing_entries
-from tankcal.job.plausibility_table import CODES
+from tankcal.job.plausibility import CODES
 from tankcal.methods.base import methods
 from tankcal.report import blocks
 from tankcal.report.laboratory import find_capability, is_outside_scope

@@ -33,7 +33,7 @@ from tankcal.text.digits import PROGRAM, decimals_of_rows, fixed_rows
 from tankcal.text.shipped import LANGUAGES
 
 if TYPE_CHECKING:
-    from tankcal.pipeline.result import Result
+    from tankcal.pipeline.chain import Result
     from tankcal.report.laboratory import Letterhead
 
 

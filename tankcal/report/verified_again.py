@@ -374,8 +374,8 @@ def verify_saved_folder(verification, folder, callbacks, manifest, inputs):
     -------
     bool
     """
-    from tankcal.record.camera_versions import CAMERA
     from tankcal.record.plan import PLAN
+    from tankcal.record.versions import CAMERA
     from tankcal.report.saved_documents import find_document
 
     document, path = find_document(folder)

@@ -18,7 +18,6 @@ from tankcal.adjust import CRITICAL
 from tankcal.camera.model import PARAMETERS, UNITS, refer_to_focus
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
-from tankcal.survey.datum import Frame, make_frame
 from tankcal.survey.diagnosis.blunders import (
     SOME,
     count_set_aside,
@@ -28,14 +27,17 @@ from tankcal.survey.diagnosis.blunders import (
     gross_readings,
     search_blunders,
 )
-from tankcal.survey.diagnosis.checks import (
+from tankcal.survey.diagnosis.diagnoses import (
+    MIRROR,
     check_points,
     check_readings,
     check_readings_off,
+    diagnose,
     find_disagreeing_checks,
+    names_alike,
+    same_place,
     scale_of_control,
 )
-from tankcal.survey.diagnosis.diagnoses import MIRROR, diagnose, names_alike, same_place
 from tankcal.survey.diagnosis.misread_files import (
     find_strained_control,
     likely_mistake,
@@ -45,6 +47,7 @@ from tankcal.survey.diagnosis.misread_files import (
 )
 from tankcal.survey.network import Adjusted, predict
 from tankcal.survey.network.adjustment import find_hardly_determined
+from tankcal.survey.network.datum import Frame, make_frame
 from tankcal.survey.network.reliability import HELD, UNCONTROLLED, reactions
 from tankcal.survey.network.survey import IMAGES
 from tankcal.survey.network_of_survey import GatheredSurvey, find_point_row, gather, held_trace

@@ -18,7 +18,7 @@ import numpy as np
 from tankcal.covariance import PointCovariance
 from tankcal.survey.points import Points
 from tankcal.survey.results import Cause
-from tankcal.survey.sighting import NETWORK, bias_by_incidence
+from tankcal.survey.wall_hits import NETWORK, bias_by_incidence
 
 NOTHING = 1e-12  # share of the largest variance of a covariance, below which a column is rounding
 

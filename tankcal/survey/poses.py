@@ -33,7 +33,7 @@ from tankcal.errors import InputError, Problem
 from tankcal.geometry.circles import taubin_circle
 from tankcal.geometry.field.components import SETTLEMENT_FALL, SETTLEMENT_MODES
 from tankcal.messages import message
-from tankcal.survey.sighting import FRAME, NETWORK, WALL, Poses, certified_m, rays
+from tankcal.survey.wall_hits import FRAME, NETWORK, WALL, Poses, certified_m, rays
 from tankcal.units import FULL_TURN
 
 

@@ -1,6 +1,7 @@
-"""Poses of scans from targets shared with a survey and with other scans.
+"""Scans of a wall: declared position, scanner and targets, and poses from shared targets.
 
-A scan s measures p, and a target t of it has the position
+Targets are shared with a survey and with other scans. A scan s measures p, and a target t of it has
+the position
 
     X_t = c_s + exp(w_s) R_s b (d' - o) / ((1 + m) d),     b = p - (position of the scanner),
 
@@ -9,15 +10,12 @@ rotation about the axes of the tank, m the scale of the scanner, and o its offse
 least squares adjustment estimates all poses. Surveyed targets enter with their full covariance,
 targets shared by scans only are unknowns, and m and o have the uncertainty of their certificate.
 The offset on paint differs from that on targets, so o does not determine the offset on the wall.
+Targets with wrong names, a wrong frame or a wrong unit are detected by rigid motions of a scan.
 
 Source: Mikhail & Ackermann 1976, ch. 9 (least squares); Arun et al. 1987 (start); Baarda 1968 (w).
-
-Adjustment of a registration: start values of poses, observation equations of targets, tests.
-
-Targets with wrong names, a wrong frame or a wrong unit are detected by rigid motions of a scan.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.linalg
@@ -29,8 +27,79 @@ from tankcal.geometry.rotations import apply_small_rotation, vector_derivatives
 from tankcal.messages import message
 from tankcal.survey.beams import by_turn
 from tankcal.survey.readings import certified_distance_m
-from tankcal.survey.scans import KnownTargets
-from tankcal.survey.sighting import FRAME, NETWORK
+from tankcal.survey.wall_hits import FRAME, NETWORK, RangingInstrument
+
+
+@dataclass(frozen=True)
+class ScanSetup:
+    """A scan with its scanner and its declared pose.
+
+    Attributes
+    ----------
+    name : str
+        Unique name of the scan.
+    scanner : str
+    surface : str
+        Surface scanned, "" if all are alike; each surface has its own incidence bias.
+    pose : ndarray, shape (4, 4), or None
+        From the frame of the scan to that of the tank, m; None: not given.
+    beam_from_m : ndarray, shape (3,)
+        Position of the scanner in the frame of the scan.
+    s_translation_m, s_rotation_rad : float
+        Standard deviations of the pose along and about each axis of the tank; nan: not declared.
+    is_assumed : bool
+        Whether one of these is an assumption of the program.
+    """
+
+    name: str
+    scanner: str
+    surface: str = ""
+    pose: np.ndarray | None = None
+    beam_from_m: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    s_translation_m: float = np.nan
+    s_rotation_rad: float = np.nan
+    is_assumed: bool = False
+
+    @property
+    def is_declared(self):
+        """Whether both standard deviations of the pose are declared."""
+        return not (np.isnan(self.s_translation_m) or np.isnan(self.s_rotation_rad))
+
+
+@dataclass(frozen=True)
+class ScanTarget:
+    """A target of a scan: its position in the frame of the scan, and the sd of each axis, m."""
+
+    scan: str
+    target: str
+    xyz_m: np.ndarray
+    sd_m: float
+    row: int | None = None
+
+
+@dataclass(frozen=True)
+class KnownTargets:
+    """Targets with known positions, for example from a total station.
+
+    Attributes
+    ----------
+    names : tuple of str
+    xyz_m : ndarray, shape (k, 3)
+        In the frame of the tank.
+    covariance_m2 : ndarray, shape (3k, 3k)
+    """
+
+    names: tuple = ()
+    xyz_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    covariance_m2: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+
+
+@dataclass(frozen=True)
+class Scanners:
+    """Scanners by name, and the scanners with an assumed offset or scale."""
+
+    tools: dict[str, RangingInstrument]
+    assumed: tuple = ()
 
 
 @dataclass(frozen=True)
@@ -128,7 +197,7 @@ def register(scans, tools, targets=(), known=None):
 
     Examples
     --------
-    >>> from tankcal.survey.scans import ScanSetup
+    >>> from tankcal.survey.registration import ScanSetup
     >>> from tankcal.survey.wall_hits import RangingInstrument
     >>> alone = ScanSetup("A", "S", s_translation_m=0.0, s_rotation_rad=5e-5)
     >>> found = register([alone], {"S": RangingInstrument("S", u_offset_m=0.001)})

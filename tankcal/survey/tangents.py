@@ -36,7 +36,7 @@ from tankcal.covariance import PointCovariance
 from tankcal.messages import message
 from tankcal.survey.points import Points
 from tankcal.survey.results import Cause
-from tankcal.survey.sighting import Poses
+from tankcal.survey.wall_hits import Poses
 from tankcal.units import FULL_TURN
 
 MOST_TANGENTS = 25_000  # largest number that was verified, see docs/studies/sizes.md

@@ -13,7 +13,7 @@ from starlette.testclient import TestClient
 from tankcal.errors import InputError
 from tankcal.products.app import access, serving
 from tankcal.products.app.access import ROLES, People, add_user
-from tankcal.products.app.review_pages import find_signature
+from tankcal.products.app.office_pages import find_signature
 from tankcal.products.app.site import Site
 from tankcal.products.desk import jobs
 from tankcal.products.desk.draft import Draft
@@ -158,7 +158,7 @@ def test_remarks_are_resolved_once(folder):
 @pytest.mark.slow
 def test_who_submitted_approves_only_with_a_reason(client, site, folder, monkeypatch):
     # A record without numbers cannot be assessed.
-    monkeypatch.setattr("tankcal.products.app.review_pages._refuse_unexplained", lambda job: None)
+    monkeypatch.setattr("tankcal.products.app.office_pages._refuse_unexplained", lambda job: None)
     key, sha = site.add(folder), write_record(folder)
 
     def decide(decision, name, text=""):

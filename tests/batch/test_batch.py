@@ -17,7 +17,7 @@ from conftest import EXAMPLE
 
 from tankcal.cli import main
 from tankcal.products.batch import journal, running, steps
-from tankcal.products.batch.options import Options
+from tankcal.products.batch.outcomes import Options
 from tankcal.products.batch.running import find_changes
 
 pytestmark = pytest.mark.slow  # seconds of runs and papers

@@ -28,7 +28,7 @@ from batch_jobs import (
 
 from tankcal.errors import InputError
 from tankcal.products.batch import running
-from tankcal.products.batch.options import Options
+from tankcal.products.batch.outcomes import Options
 from tankcal.products.batch.running import Callbacks, run_batch
 
 pytest.importorskip("distributed")

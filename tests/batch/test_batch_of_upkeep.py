@@ -15,7 +15,7 @@ from conftest import EXAMPLE
 from example_logs import make_station
 
 from tankcal import cli
-from tankcal.products.batch.options import Options
+from tankcal.products.batch.outcomes import Options
 from tankcal.products.batch.running import run_batch
 
 pytest.importorskip("distributed")

@@ -6,7 +6,7 @@ from job_builder import write_workbook
 
 from tankcal.errors import InputError
 from tankcal.products.batch.finding import find_jobs
-from tankcal.products.batch.options import Options, parse_steps, refuse_incomplete
+from tankcal.products.batch.outcomes import Options, parse_steps, refuse_incomplete
 
 RUN = Options()
 

@@ -9,7 +9,7 @@ from job_builder import write_workbook
 import tankcal
 from tankcal.products.batch.finding import BatchJob
 from tankcal.products.batch.journal import compute_keys, digest_inputs
-from tankcal.products.batch.options import Options
+from tankcal.products.batch.outcomes import Options
 
 ALL = Options(steps=("run", "compare", "inspect"))
 

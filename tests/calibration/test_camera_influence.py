@@ -27,7 +27,7 @@ from tankcal.errors import InputError
 from tankcal.geometry.rotations import rotation_of_angles, rotation_vector
 from tankcal.job.model import Job, Material
 from tankcal.record.adjustment import adjustment_of
-from tankcal.record.camera_analyses import plain_influence
+from tankcal.record.camera import plain_influence
 from tankcal.record.schema import to_plain
 from tankcal.survey.measurements import (
     AdjustmentSettings,

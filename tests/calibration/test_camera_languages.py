@@ -11,11 +11,11 @@ from camera_sets import sets
 from invented_language import bracketed, without_brackets
 from paper_cells import blocks_of_cells
 
-from tankcal.calibration.product.check import read_limits, shipped_limits
+from tankcal.calibration.product import read_limits, shipped_limits
 from tankcal.calibration.stability.comparison import compare
 from tankcal.errors import TankcalError
-from tankcal.record import camera_analyses as stability_json
-from tankcal.record.camera_versions import KINDS
+from tankcal.record import camera as stability_json
+from tankcal.record.versions import CAMERA_KINDS
 from tankcal.report import camera as camera_papers
 from tankcal.report.camera import paper as papers
 from tankcal.report.camera.figures import widen_to_decades
@@ -71,7 +71,7 @@ def texts_of_paper(result, folder, language=None):
     """Every text that the cells of the template show of a result."""
     path = folder / "camera.json"
     path.write_text(json.dumps(result), encoding="utf-8")
-    others = [kind for kind in KINDS if kind != result["kind"]]
+    others = [kind for kind in CAMERA_KINDS if kind != result["kind"]]
     notebook = join_templates(str(path), others, (camera_papers.TEMPLATE,), LANGUAGE=language)
     return [text for block in blocks_of_cells(notebook) for text in shown_in(block)]
 
@@ -79,7 +79,7 @@ def texts_of_paper(result, folder, language=None):
 SLOW_FIXTURES = {"result", "results"}  # seconds each
 
 
-@pytest.fixture(params=KINDS)
+@pytest.fixture(params=CAMERA_KINDS)
 def result(request, results):
     return results[request.param] | {"made_from": MADE_FROM}
 

@@ -10,12 +10,12 @@ import pytest
 from camera_sets import HOSTILE, SMALL, Q, sets
 
 from tankcal.calibration.interiors import decentring_profile, radial_curve
-from tankcal.calibration.product.check import check_product, shipped_limits
+from tankcal.calibration.product import check_product, shipped_limits
 from tankcal.calibration.stability.comparison import compare
 from tankcal.camera.model import Form, distort_image_points
 from tankcal.errors import InputError
-from tankcal.record import camera_analyses as product_json
-from tankcal.record import camera_analyses as stability_json
+from tankcal.record import camera as product_json
+from tankcal.record import camera as stability_json
 from tankcal.report import camera as camera_papers
 from tankcal.report.camera.paper import CameraPaper, load, number_names, shorten
 from tankcal.report.numbers import concise

@@ -33,8 +33,8 @@ from tankcal.calibration.parameters.recommendation import Evidence, Limit, pesso
 from tankcal.camera.model import PARAMETERS, Form
 from tankcal.errors import InputError
 from tankcal.record import record_of, record_of_adjustment
-from tankcal.record.camera_parameters import plain_parameters
-from tankcal.record.camera_versions import FORMAT
+from tankcal.record.camera import plain_parameters
+from tankcal.record.versions import CAMERA
 from tankcal.survey import adjust_survey
 from tankcal.survey.measurements import AdjustmentSettings
 from tankcal.survey.network.adjustment import global_test
@@ -588,7 +588,7 @@ def test_record_gives_the_same_without_trials(silva_result, silva_job):
 def test_all_of_it_is_plain_data(silva_parameters):
     found = plain_parameters(silva_parameters)
     assert list(found)[:3] == ["format", "kind", "camera"]
-    assert (found["format"], found["kind"]) == (FORMAT, "parameters")
+    assert (found["format"], found["kind"]) == (CAMERA.format, "parameters")
     assert json.loads(json.dumps(found, allow_nan=False)) == found
     assert [one["name"] for one in found["parameters"]] == list(NAMES)
     assert found["parameters"][0]["edge_um"] is None

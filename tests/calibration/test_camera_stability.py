@@ -39,7 +39,7 @@ from tankcal.errors import InputError, SolutionError
 from tankcal.geometry.rotations import angles_of, apply_small_rotation, rotation_of_angles
 from tankcal.job import load
 from tankcal.job.calibrations import choose, read_cameras
-from tankcal.record.camera_analyses import plain_stability, summary
+from tankcal.record.camera import plain_stability, summary
 from tankcal.survey.measurements import CameraSetup
 from tankcal.survey.network.survey import Camera
 

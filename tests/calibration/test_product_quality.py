@@ -9,7 +9,7 @@ import pytest
 from draws import draws
 from scipy import stats
 
-from tankcal.calibration.product.check import (
+from tankcal.calibration.product import (
     Limit,
     LimitTable,
     check_product,
@@ -20,8 +20,8 @@ from tankcal.calibration.product.check import (
 )
 from tankcal.calibration.product.differences import collect_differences, read_differences
 from tankcal.errors import InputError
-from tankcal.record.camera_analyses import plain_product
-from tankcal.record.camera_versions import FORMAT
+from tankcal.record.camera import plain_product
+from tankcal.record.versions import CAMERA
 from tankcal.survey.results import CheckPoints
 
 
@@ -412,7 +412,7 @@ def test_differences_of_adjustment_and_record_agree():
 def test_json_agrees_with_the_check():
     d = np.column_stack([scattered(20, 0.4, 0.05), scattered(20, 0, 0.05, 1)])
     found = plain_product(check_product(d, ("x", "y"), limits=shipped_limits()))
-    assert (found["format"], found["kind"]) == (FORMAT, "product")
+    assert (found["format"], found["kind"]) == (CAMERA.format, "product")
     first = next(one for one in found["best"] if one["scale"] == "1000")
     assert (first["grade"], first["grade_unbiased"]) == ("C", "A")
     assert found["verdicts"][0]["as_is"]["why"] == ["share_too_small", "rmse_too_large"]

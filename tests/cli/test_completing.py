@@ -10,7 +10,7 @@ import pytest
 
 from tankcal.cli import _parser_in_english
 from tankcal.cli.completing import SHELLS, completion_script
-from tankcal.terminal.showing import speak
+from tankcal.terminal import speak
 
 pytest.importorskip("shtab")
 LINES = {  # what is typed: what completes its last word (property: read off the parser's help)

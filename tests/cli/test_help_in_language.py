@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tankcal.cli import _parser, main, translate_parser
-from tankcal.terminal.showing import speak
+from tankcal.terminal import speak
 from tankcal.text.shipped import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words
 

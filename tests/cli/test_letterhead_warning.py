@@ -1,7 +1,7 @@
 """The letterhead states entries of the certificate that the terminal no longer calls missing."""
 
 from tankcal.cli.running import _complete_by_letterhead
-from tankcal.pipeline.checks.survey import incomplete_certificate
+from tankcal.pipeline.checks import incomplete_certificate
 
 
 def test_entries_of_the_letterhead_are_not_missing(example_result):

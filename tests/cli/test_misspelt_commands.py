@@ -11,7 +11,7 @@ from tankcal.errors import reason_of
 from tankcal.job.starter.book import EXAMPLES_OF_KEYS, EXAMPLES_OF_TABLES
 from tankcal.messages import Message
 from tankcal.products.exports.profiles import shipped_profiles
-from tankcal.terminal.showing import say_in_language, speak
+from tankcal.terminal import say_in_language, speak
 from tankcal.version import install_command
 
 OTHERS = ("pt-BR", "es")

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from tankcal.terminal.showing import Progress, describe_progress
+from tankcal.terminal import Progress, describe_progress
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from job_builder import write_job
 from tankcal.cli import main
 from tankcal.record import manifest
 from tankcal.report.folders import PREFIX
-from tankcal.terminal.stopping import EndingSignal, raise_at_signals, signal_status
+from tankcal.terminal import EndingSignal, raise_at_signals, signal_status
 
 needs_signals = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 

@@ -5,8 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tankcal.clouds.wall.cells import CellGrid
-from tankcal.clouds.wall.readings import unroll_wall
+from tankcal.clouds.wall.cells import CellGrid, unroll_wall
 
 
 def make_wall(radius_m, joints_m, sides=("inside",)):

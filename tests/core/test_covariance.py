@@ -8,8 +8,7 @@ import scipy.sparse
 from tankcal.adjust import whitener
 from tankcal.covariance import PointCovariance
 from tankcal.errors import SolutionError
-from tankcal.geometry.cylinders import fit_cylinder
-from tankcal.geometry.primitives import fit_sphere
+from tankcal.geometry.primitives import fit_cylinder, fit_sphere
 from tankcal.pipeline.wall.surveyed import s_transform
 from tankcal.sections import Group, circle_by_coordinates, fit_section, sample_of
 from tankcal.survey.points import Points

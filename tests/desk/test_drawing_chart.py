@@ -97,7 +97,7 @@ def test_the_chart_is_marked_as_no_calibration(language):
 def test_a_recorded_budget_gives_the_U_of_the_result(tmp_path, name):
     """Factors on the lines of a record, compared with the sources of the result itself."""
     import tankcal
-    from tankcal.products.desk.what_if import change_recorded_budget, list_recorded_budgets
+    from tankcal.products.desk.calculators import change_recorded_budget, list_recorded_budgets
     from tankcal.report import outputs
     from tankcal.report.paper import Paper
 

@@ -8,8 +8,7 @@ import pytest
 
 from tankcal.geometry.field.amplitudes import assumed_amplitudes
 from tankcal.geometry.field.components import COMPONENTS, weld_columns
-from tankcal.geometry.field.covariances import Covariances
-from tankcal.geometry.field.sites import Sites
+from tankcal.geometry.field.sites import Covariances, Sites
 from tankcal.geometry.girth import SHORTEST_WAVE_M, draw_waves, modes_of, nodes_of
 from tankcal.planning.wall.nominal_readings import draw_departures
 

@@ -22,9 +22,8 @@ from tankcal.geometry.field.components import (
     azimuth_correlations,
     seam_correlation,
 )
-from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M, MIRRORED, invert
-from tankcal.geometry.field.sites import Sites, free_design
+from tankcal.geometry.field.sites import Covariances, Sites, free_design
 
 STEP = 1e-4  # of a logarithm, in differences
 

@@ -7,9 +7,8 @@ import scipy.sparse
 from generated_walls import FULL_TURN
 
 from tankcal.geometry.field.amplitudes import assumed_amplitudes
-from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.estimate import FieldValues, Spots, WallField, gauss_heights
-from tankcal.geometry.field.sites import Sites, free_design
+from tankcal.geometry.field.sites import Covariances, Sites, free_design
 
 RADIUS_M = 6.5
 

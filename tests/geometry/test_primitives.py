@@ -11,12 +11,14 @@ from jacobians import assert_derivative
 
 from tankcal.errors import SolutionError
 from tankcal.geometry.circles import own_columns
-from tankcal.geometry.cylinders import cylinder_distances, fit_cylinder, lying_cylinder
 from tankcal.geometry.primitives import (
     conditions_of,
+    cylinder_distances,
     ellipse_distances,
+    fit_cylinder,
     fit_ellipse,
     fit_sphere,
+    lying_cylinder,
     sphere_distances,
 )
 from tankcal.tank.solids import LyingTank

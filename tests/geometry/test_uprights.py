@@ -19,8 +19,7 @@ from tankcal.geometry.field.blunders import (
     find_uprights,
     restricted_precision,
 )
-from tankcal.geometry.field.covariances import Covariances
-from tankcal.geometry.field.sites import free_design
+from tankcal.geometry.field.sites import Covariances, free_design
 from tankcal.geometry.shell import UNDECIDED
 
 POINTS, NOISE_M = 24, 1e-3

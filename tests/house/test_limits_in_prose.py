@@ -19,8 +19,8 @@ from tankcal.clouds.formats import lines as counted_text
 from tankcal.clouds.inside import bottom
 from tankcal.clouds.inside import bottom as cloud_bottom
 from tankcal.clouds.wall import cells, deciding, growing, start
+from tankcal.clouds.wall import cells as cloud_readings
 from tankcal.clouds.wall import deciding as features
-from tankcal.clouds.wall import readings as cloud_readings
 from tankcal.geometry import clutter, shell
 from tankcal.geometry.field import blunders, components, estimate, sites
 from tankcal.geometry.field.components import COMPONENTS

@@ -5,7 +5,7 @@ import pytest
 from real_tank import write_real_job
 
 import tankcal
-from tankcal.job.plausibility_table import CODES
+from tankcal.job.plausibility import CODES
 from tankcal.record import record_of
 
 pytestmark = pytest.mark.slow

@@ -16,7 +16,7 @@ from tankcal.job.starter import write_input_workbook, write_starter
 from tankcal.job.tables import in_book
 from tankcal.messages import Message
 from tankcal.record import record_of
-from tankcal.terminal.showing import read_job_language, say_in_language, speak
+from tankcal.terminal import read_job_language, say_in_language, speak
 from tankcal.text.shipped import nearest_language
 from tankcal.text.words import load_words, meant, translate_record, word_of
 

@@ -15,7 +15,7 @@ from tankcal.products.inspection.rules import find_rule, parse_rule
 from tankcal.record import record_of, save
 from tankcal.record.inspection import CHECKS
 from tankcal.record.schema import to_plain
-from tankcal.terminal.showing import read_record_language
+from tankcal.terminal import read_record_language
 
 LEVELLED = EXAMPLE.parent / "inspection"
 OF_WALL = CHECKS[:5]

@@ -9,8 +9,7 @@ from packages import answers_of, write_answers, write_template, written_package
 from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.job.tables import Log
-from tankcal.products.intercomparison.answers import read_answers
-from tankcal.products.intercomparison.scoring import score_folders
+from tankcal.products.intercomparison.answers import read_answers, score_folders
 from tankcal.record.intercomparison import ANSWERS, SCORES
 from tankcal.record.schema import to_plain
 

@@ -18,10 +18,10 @@ from packages import (
 from tankcal.errors import InputError
 from tankcal.job import load
 from tankcal.job.tables import Log
+from tankcal.products.intercomparison.answers import score_folders
 from tankcal.products.intercomparison.command import METHODS as NAMED
 from tankcal.products.intercomparison.observers import METHODS as ALL
 from tankcal.products.intercomparison.package import load_package, make_package
-from tankcal.products.intercomparison.scoring import score_folders
 from tankcal.products.intercomparison.tank import tank_of
 
 

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import binom
 
-from tankcal.products.intercomparison.scoring import (
+from tankcal.products.intercomparison.answers import (
     exact_bounds,
     form_of,
     score_method,

@@ -7,12 +7,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from tankcal.products.intercomparison.defects import Band, Buckle, Course, Dent, Flat, Oval, Seam
 from tankcal.products.intercomparison.site import request_table
 from tankcal.products.intercomparison.tank import (
     FAMILIES,
+    Band,
+    Buckle,
+    Course,
+    Dent,
     Fitting,
+    Flat,
     Floor,
+    Oval,
+    Seam,
     Tank,
     Wave,
     draw_tank,

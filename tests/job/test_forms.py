@@ -12,9 +12,9 @@ from tankcal.job.contract import COLUMNS
 from tankcal.job.starter import write_form, write_input_workbook, write_starter
 from tankcal.job.starter.writing import Form
 from tankcal.products.batch.finding import find_jobs
-from tankcal.products.batch.options import Options
+from tankcal.products.batch.outcomes import Options
 from tankcal.report.folders import default_folder
-from tankcal.terminal.showing import read_job_language
+from tankcal.terminal import read_job_language
 from tankcal.text.shipped import DEFAULT, LANGUAGES
 
 BLANKS = [

@@ -16,7 +16,7 @@ from metered_tanks import METER, column, metered_parts, metered_rows
 import tankcal
 from tankcal.errors import InputError
 from tankcal.job.checks.extent import volume_by_sizes
-from tankcal.job.plausibility_table import TABLE
+from tankcal.job.plausibility import TABLE
 from tankcal.job.starter import write_input_workbook
 from tankcal.text.shipped import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words, say

@@ -26,7 +26,7 @@ from tankcal.job.contract import (
 from tankcal.job.fields import Field
 from tankcal.job.rule_files import LIMITS, RULE, parse_rule, shipped_names
 from tankcal.job.starter import write_input_workbook, write_starter
-from tankcal.job.starter.page import filled_page
+from tankcal.job.starter.texts import filled_page
 from tankcal.job.starter.writing import OF_GREAT_CIRCLES, STRAPPED
 from tankcal.job.tables import Log
 from tankcal.tank.rules import TANKS

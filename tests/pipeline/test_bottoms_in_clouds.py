@@ -25,8 +25,7 @@ from tankcal.methods.clouds.bottom import CloudInside, with_bottom
 from tankcal.record import record_of
 from tankcal.record.schema import check_data
 from tankcal.record.versions import RECORD
-from tankcal.survey.registration import register
-from tankcal.survey.scans import ScanSetup
+from tankcal.survey.registration import ScanSetup, register
 from tankcal.survey.wall_hits import RangingInstrument
 from tankcal.tank.bottoms import Footprint, surveyed_bottom
 from tankcal.tank.budgets import cause_factors

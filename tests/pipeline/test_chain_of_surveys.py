@@ -12,7 +12,7 @@ from tankcal.covariance import PointCovariance
 from tankcal.errors import InputError, SolutionError
 from tankcal.job.model import DeclaredInput, Sphere
 from tankcal.pipeline.chain import adjust_job, run
-from tankcal.pipeline.checks.survey import refuse_undetermined
+from tankcal.pipeline.checks import refuse_undetermined
 from tankcal.pipeline.tanks import body_of, insets_of, shell_volume
 from tankcal.pipeline.wall.finding import find_wall, fit_wall
 from tankcal.pipeline.wall.surveyed import s_transform

@@ -42,7 +42,7 @@ from tankcal.methods.clouds.passes import (
 )
 from tankcal.methods.clouds.readings import CloudFile
 from tankcal.record import record_of
-from tankcal.survey.scans import ScanSetup
+from tankcal.survey.registration import ScanSetup
 from tankcal.survey.wall_hits import RangingInstrument
 
 distributed = pytest.importorskip("distributed")

@@ -24,7 +24,7 @@ from scipy.stats import binom
 from test_coverage_of_walls import ROWS, Found, judged
 
 from tankcal.errors import TankcalError
-from tankcal.job.plausibility_table import CODES
+from tankcal.job.plausibility import CODES
 from tankcal.methods.hits.wall import find_hit_wall
 from tankcal.methods.strapping.wall import find_strapped_wall
 from tankcal.methods.tangents.wall import touch_wall

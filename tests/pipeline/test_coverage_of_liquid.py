@@ -10,8 +10,8 @@ import pytest
 from metered_runs import fill, metered_job
 from page_figures import figures_of, value_of
 
+from tankcal.pipeline.liquid import find_nominal_wall, geometry_alone, join_body
 from tankcal.pipeline.liquid.adjustment import adjust_liquid
-from tankcal.pipeline.liquid.body import find_nominal_wall, geometry_alone, join_body
 from tankcal.tank.solids import LyingTank, Sphere
 from tankcal.uncertainty import combine
 

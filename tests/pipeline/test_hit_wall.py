@@ -26,7 +26,7 @@ from tankcal.cli.running import describe_rejected
 from tankcal.pipeline.wall.finding import take_points
 from tankcal.pipeline.wall.shared_unknowns import estimate_causes
 from tankcal.survey import adjust_survey, wall_points
-from tankcal.survey.sighting import sight
+from tankcal.survey.wall_hits import sight
 
 FOOT, SLOPE, HEIGHT = (1.0, -0.5), (0.002, -0.001), 8.0
 STATION = np.array([0.0, 0.0, 1.5])

@@ -28,8 +28,8 @@ from test_hit_wall import (
 )
 
 import tankcal
-from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M
+from tankcal.geometry.field.sites import Covariances
 from tankcal.methods.lines.warnings import check_leans, compare_leans, levels_and_lean
 from tankcal.units import ARCSEC
 

@@ -20,8 +20,8 @@ from page_figures import figures_of
 import tankcal
 from tankcal.job.model import DeclaredInput
 from tankcal.methods.liquid.warnings import check_liquid
+from tankcal.pipeline.liquid import geometry_alone, geometry_beside, join_body
 from tankcal.pipeline.liquid.adjustment import adjust_liquid
-from tankcal.pipeline.liquid.body import geometry_alone, geometry_beside, join_body
 from tankcal.pipeline.liquid.measuring import is_steady_leak, measure_by_liquid
 from tankcal.pipeline.surveying import find_survey
 from tankcal.record import record_of

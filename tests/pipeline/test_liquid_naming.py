@@ -12,8 +12,8 @@ from metered_runs import Fault, fill, metered_job
 from page_figures import figures_of, shares_agree, value_of
 
 from tankcal.job.model import DeclaredInput
+from tankcal.pipeline.liquid import Geometry, find_nominal_wall, geometry_alone
 from tankcal.pipeline.liquid.adjustment import adjust_liquid
-from tankcal.pipeline.liquid.body import Geometry, find_nominal_wall, geometry_alone
 from tankcal.pipeline.liquid.measuring import alternatives_of, is_steady_leak
 from tankcal.tank.liquid import name_causes
 from tankcal.tank.solids import LyingTank

@@ -21,13 +21,13 @@ import tankcal
 from tankcal.cli.running import _tell
 from tankcal.errors import InputError
 from tankcal.job.contract import COLUMNS, KEYS
-from tankcal.job.plausibility_table import CODES, TABLE
+from tankcal.job.plausibility import CODES, TABLE
 from tankcal.pipeline.checks import size as plausibility
 from tankcal.pipeline.scanned_solids import fit_scan
 from tankcal.record import record_of
 from tankcal.report import certificate
 from tankcal.report.paper import Paper
-from tankcal.survey.diagnosis.checks import check_readings_off, scale_of_control
+from tankcal.survey.diagnosis.diagnoses import check_readings_off, scale_of_control
 from tankcal.survey.measurements import Setup
 from tankcal.survey.results import Reading, Readings
 from tankcal.text.shipped import shipped_folder

@@ -20,8 +20,8 @@ from tankcal.planning.wall.nominal_readings import (
     plates_of,
     set_readings,
 )
-from tankcal.survey.sighting import rays
 from tankcal.survey.strapping import reduce_straps
+from tankcal.survey.wall_hits import rays
 
 PLANS = {"lines": LINES, "hits": HITS, "tangents": TANGENTS}
 

@@ -30,9 +30,9 @@ from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.table import compute_table
 from tankcal.planning import load_plan, predict, smallest, what_helps
 from tankcal.planning.improvements import Effect, changes_of
+from tankcal.planning.model import PlannedHits, PlannedStrap, even_radius_m, evenness_of_limbs
 from tankcal.planning.wall.changes import instruments_in_use, wall_changes_of
 from tankcal.planning.wall.design_tables import tangent_sight
-from tankcal.planning.wall.model import PlannedHits, PlannedStrap, even_radius_m, evenness_of_limbs
 from tankcal.planning.wall.nominal_readings import expect_amplitudes, set_nominal_readings
 from tankcal.planning.wall.prediction import predict_wall_table
 from tankcal.planning.wall.reading import change_plan, tables_of

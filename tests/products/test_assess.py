@@ -13,7 +13,7 @@ from written_pdfs import write_pdf
 
 from tankcal.cli import main
 from tankcal.products.assess.assessing import REQUIREMENTS, assess, plain_assessment
-from tankcal.products.assess.entries import LABELS, PLACEHOLDER, find_claim, find_interval
+from tankcal.products.assess.checks import LABELS, PLACEHOLDER, find_claim, find_interval
 from tankcal.products.assess.evidence import CERTIFICATE
 from tankcal.products.assess.paper import DOCUMENT, AssessmentPaper
 from tankcal.products.assess.requirements import (

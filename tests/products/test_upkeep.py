@@ -27,9 +27,9 @@ from station_years import draw_from_model, draw_year, liquid_factor, make_table
 from tankcal import cli
 from tankcal.products.quantity.table import TankTable, read_table
 from tankcal.products.upkeep.causes import PRIORS, Operation, TableStock
-from tankcal.products.upkeep.clocks import find_offset_s
 from tankcal.products.upkeep.estimation import _solve, estimate
 from tankcal.products.upkeep.flows import MeterFlow
+from tankcal.products.upkeep.logs import find_offset_s
 from tankcal.products.upkeep.reading import read_upkeep
 from tankcal.products.upkeep.steps import Marks, Steps
 from tankcal.products.upkeep.upkeep import _error_ratio, keep_up, update_table

@@ -27,7 +27,7 @@ from tankcal.job.tables import Log
 from tankcal.products.upkeep import logs
 from tankcal.products.upkeep.estimation import estimate
 from tankcal.products.upkeep.flows import read_flows
-from tankcal.products.upkeep.own_table import compare_own_volumes
+from tankcal.products.upkeep.levels import compare_own_volumes
 from tankcal.products.upkeep.paper import UpkeepPaper, pages
 from tankcal.products.upkeep.upkeep import list_steps
 

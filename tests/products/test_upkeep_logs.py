@@ -13,8 +13,7 @@ from tankcal.job.tables import Log
 from tankcal.products.upkeep import logs
 from tankcal.products.upkeep.flows import quiet_windows, read_flows
 from tankcal.products.upkeep.levels import LevelSums, find_lines
-from tankcal.products.upkeep.logs import Findings, LogFile
-from tankcal.products.upkeep.profiles import read_log_profile
+from tankcal.products.upkeep.logs import Findings, LogFile, read_log_profile
 from tankcal.products.upkeep.steps import StepRules, Tickets, build_steps, mean_sd_m
 
 SECOND = 10**9

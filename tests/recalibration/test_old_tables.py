@@ -16,7 +16,7 @@ from tankcal.products.recalibration.read_table import read_table
 from tankcal.products.recalibration.seams import Fitting
 from tankcal.products.recalibration.solid_geometry import fit_lying
 from tankcal.products.recalibration.table_fit import State, find_computed_rows
-from tankcal.report.table_job import write_job
+from tankcal.products.recalibration.table_job import write_job
 
 PLATES = np.array([0.009, 0.008, 0.007, 0.006])
 RADII = np.array([6.0, 6.004, 5.997, 6.002])

@@ -13,8 +13,7 @@ from tankcal.products.recalibration.solid_geometry import (
     size_sections,
     uncertainty_rows,
 )
-from tankcal.products.recalibration.table_job import make_solid_job
-from tankcal.report.table_job import write_job
+from tankcal.products.recalibration.table_job import make_solid_job, write_job
 
 SLICES = 4000
 PRINTED = (  # recalibration.md, section 3: litres at 0.1, 0.2 ... 2.4 m

@@ -7,13 +7,13 @@ import pytest
 from kept_results import FREE, KEPT, kept_files, keys_file, read
 from schemas import SAVED, keys_in, keys_of_schema
 
-from tankcal.calibration.product.check import check_product
+from tankcal.calibration.product import check_product
 from tankcal.errors import InputError
 from tankcal.planning import load_plan, predict
-from tankcal.record.camera_analyses import plain_product
-from tankcal.record.camera_versions import CAMERA
+from tankcal.record.camera import plain_product
 from tankcal.record.plan import PLAN, plain_of
 from tankcal.record.schema import check_data, from_plain, to_plain
+from tankcal.record.versions import CAMERA
 from tankcal.report import camera as camera_papers
 from tankcal.report.camera.paper import load
 from tankcal.report.planning import empty_job

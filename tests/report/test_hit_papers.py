@@ -5,7 +5,7 @@ import pytest
 from paper_words import assert_tables_have_words, cells_of_sheet, instruments_said
 
 import tankcal
-from tankcal.methods.hits import tables as hits
+from tankcal.methods.hits import saved as hits
 from tankcal.record import record_of
 from tankcal.text.shipped import LANGUAGES
 

@@ -61,7 +61,7 @@ def test_the_csv_file_has_every_offset(plumbed):
 
 
 def test_paper_has_every_offset_by_its_level(plumbed):
-    from tankcal.methods.lines.tables import largest_departures, offsets_by_level
+    from tankcal.methods.lines.saved import largest_departures, offsets_by_level
 
     result, folder = plumbed
     paper = Paper(load_record(folder / "record.json"))
@@ -77,7 +77,7 @@ def test_paper_has_every_offset_by_its_level(plumbed):
 
 
 def test_many_lines_stand_in_several_tables(plumbed):
-    from tankcal.methods.lines.tables import offsets_by_level
+    from tankcal.methods.lines.saved import offsets_by_level
 
     record = load_record(plumbed[1] / "record.json")
     record["lines"]["lines"] *= 3

@@ -7,7 +7,7 @@ import pytest
 from conftest import EXAMPLE
 
 import tankcal
-from tankcal.methods.great_circles.tables import CIRCLES
+from tankcal.methods.great_circles.saved import CIRCLES
 from tankcal.record import load as load_record
 from tankcal.record import read
 from tankcal.report.outputs import write, write_tables

@@ -7,7 +7,7 @@ import pytest
 from job_builder import strapped_parts, write_folder
 
 import tankcal
-from tankcal.methods.strapping.tables import STRAPS, strapped_courses_of, straps_of
+from tankcal.methods.strapping.saved import STRAPS, strapped_courses_of, straps_of
 from tankcal.record import load as load_record
 from tankcal.record import read
 from tankcal.report.outputs import write

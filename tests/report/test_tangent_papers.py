@@ -7,7 +7,7 @@ import pytest
 from paper_words import assert_tables_have_words, cells_of_sheet, instruments_said
 
 import tankcal
-from tankcal.methods.tangents import tables as tangents
+from tankcal.methods.tangents import saved as tangents
 from tankcal.record import record_of
 from tankcal.text.shipped import LANGUAGES
 

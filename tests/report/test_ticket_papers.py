@@ -16,7 +16,7 @@ from dcc_schema import DCC, SI, schema
 from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.products.quantity.reading import read_tickets
-from tankcal.products.quantity.saving import document_file, ticket_file
+from tankcal.products.quantity.results import document_file, ticket_file
 from tankcal.products.quantity.table import TankTable, read_table
 from tankcal.record.schema import to_plain
 from tankcal.report.laboratory import Letterhead

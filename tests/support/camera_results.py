@@ -11,12 +11,12 @@ from photographed_jobs import by_tape, control_of, measurements, tank_job
 
 from tankcal.calibration.influence.runs import influence
 from tankcal.calibration.parameters.analysis import analyse_job
-from tankcal.calibration.product.check import check_product, shipped_limits
+from tankcal.calibration.product import check_product, shipped_limits
 from tankcal.calibration.stability.comparison import compare
-from tankcal.record import camera_analyses as influence_json
-from tankcal.record import camera_analyses as product_json
-from tankcal.record import camera_analyses as stability_json
-from tankcal.record import camera_parameters as parameters_json
+from tankcal.record import camera as influence_json
+from tankcal.record import camera as parameters_json
+from tankcal.record import camera as product_json
+from tankcal.record import camera as stability_json
 from tankcal.survey.measurements import AdjustmentSettings, Instrument
 
 CONTROL = tuple(f"P{i}" for i in range(1, 48, 6))

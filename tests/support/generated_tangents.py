@@ -15,8 +15,8 @@ from job_builder import tangent_parts, write_folder
 
 import tankcal
 from tankcal.survey.measurements import Setup
-from tankcal.survey.sighting import NETWORK, Poses
 from tankcal.survey.tangents import Tangents
+from tankcal.survey.wall_hits import NETWORK, Poses
 
 STEPS, HALVINGS = 400, 32  # along a sight near the wall; of the bracket of its azimuth
 SIDES = ("left", "right")

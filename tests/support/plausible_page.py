@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
-from tankcal.job.plausibility_table import TABLE
+from tankcal.job.plausibility import TABLE
 
 PAGE = Path(__file__).parents[2] / "docs/plausible-values.md"
 HEAD = """# Plausible values
 
 This page lists the plausible range of each number of a job, the error that it detects, and its
-reference. It is generated from `tankcal/job/plausibility_table.py` by
+reference. It is generated from `tankcal/job/plausibility.py` by
 `make job-format`. The checks are explained in [plausibility checks](plausibility.md).
 
 | what | plausible range | typical error detected | compared with |

@@ -9,8 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from tankcal.geometry.circles import taubin_circle
 from tankcal.survey.beams import points_of_beams, semidefinite_cholesky
-from tankcal.survey.registration import register
-from tankcal.survey.scans import ScanSetup
+from tankcal.survey.registration import ScanSetup, register
 from tankcal.survey.wall_hits import RangingInstrument
 
 RADIUS_M, AWAY_M, SD_M = 6.5, 12.0, 0.002

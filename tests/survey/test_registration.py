@@ -12,8 +12,7 @@ import scipy.optimize
 from scipy.spatial.transform import Rotation
 
 from tankcal.errors import SolutionError
-from tankcal.survey.registration import fit_motion, register
-from tankcal.survey.scans import KnownTargets, ScanSetup, ScanTarget
+from tankcal.survey.registration import KnownTargets, ScanSetup, ScanTarget, fit_motion, register
 from tankcal.survey.wall_hits import RangingInstrument
 
 TOOLS = {"S": RangingInstrument("S", u_scale=2e-5, u_offset_m=1e-3)}

@@ -13,7 +13,7 @@ import tankcal
 from tankcal.errors import InputError
 from tankcal.methods.hits.readings import ranging_of
 from tankcal.methods.lines.readings import plummets_of
-from tankcal.pipeline.checks.survey import check_bases
+from tankcal.pipeline.checks import check_bases
 
 BAR = {"kind": "stadia", "length_m": 2.0, "u_mm": 0.02, "certificate": "B-1"}
 ARCSEC = np.pi / 180 / 3600

@@ -15,7 +15,6 @@ from tankcal.geometry.field.amplitudes import Amplitudes
 from tankcal.geometry.field.components import COMPONENTS, OVALITY_MODES
 from tankcal.geometry.girth import Ring, _support_at, tangent_excess
 from tankcal.survey.measurements import Setup
-from tankcal.survey.sighting import NETWORK, Poses
 from tankcal.survey.tangents import (
     Tangents,
     circle_of_sights,
@@ -24,6 +23,7 @@ from tankcal.survey.tangents import (
     support_columns,
     touch,
 )
+from tankcal.survey.wall_hits import NETWORK, Poses
 
 RHO, XC, YC, P2, Q2 = 10.012, 0.020, -0.010, -0.005526366, 0.002336510
 SIGHTS = {  # azimuth of the station: of its sights to the left and the right limb, degrees

@@ -22,8 +22,7 @@ from tankcal.pipeline.wall.shared_unknowns import estimate_causes
 from tankcal.survey.measurements import Setup
 from tankcal.survey.points import Points
 from tankcal.survey.results import Cause
-from tankcal.survey.sighting import Poses, sight
-from tankcal.survey.wall_hits import ControlReading, RangingInstrument, WallHits
+from tankcal.survey.wall_hits import ControlReading, Poses, RangingInstrument, WallHits, sight
 
 STATION, ZERO = np.array([0.7, -0.4, 1.5]), 0.3
 ROUND = Surface(lambda a, z: 6.5 + 0.01 * np.sin(2 * a) + 0.001 * z, (1.0, -0.5), (0.002, -0.001))

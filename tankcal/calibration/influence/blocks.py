@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.adjust import gauss_newton
-from tankcal.calibration.product.check import ALPHA, ProductCheck, check_product
+from tankcal.calibration.product import ALPHA, ProductCheck, check_product
 from tankcal.calibration.product.differences import collect_differences
 from tankcal.camera.model import PARAMETERS, UNITS, Form
 from tankcal.geometry.rotations import apply_small_rotation, rotation_vector
 from tankcal.pipeline.chain import run
-from tankcal.pipeline.checks.survey import refuse_undetermined
+from tankcal.pipeline.checks import refuse_undetermined
 from tankcal.pipeline.wall.finding import take_points
 from tankcal.pipeline.wall.surveyed import s_transform
 from tankcal.survey import wall_points

@@ -23,7 +23,7 @@ from tankcal.calibration.influence.blocks import (
     compare_blocks,
     make_block,
 )
-from tankcal.calibration.product.check import ALPHA
+from tankcal.calibration.product import ALPHA
 from tankcal.camera.model import PARAMETERS
 from tankcal.errors import InputError, Problem, TankcalError
 from tankcal.messages import message

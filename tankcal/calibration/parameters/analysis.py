@@ -41,8 +41,8 @@ from tankcal.errors import InputError, Problem, SolutionError, TankcalError
 from tankcal.messages import message
 from tankcal.pipeline.chain import adjust_job
 from tankcal.survey import Adjustment
-from tankcal.survey.datum import make_frame
 from tankcal.survey.network import adjust
+from tankcal.survey.network.datum import make_frame
 from tankcal.survey.network.snooping import start_from_adjusted
 from tankcal.survey.network_of_survey import gather
 from tankcal.survey.results import causes_of

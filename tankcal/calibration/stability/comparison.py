@@ -57,7 +57,7 @@ UNDONE_MM = 1e-9  # tolerance of a point after correction and renewed distortion
 
 @dataclass(frozen=True)
 class Convention:
-    """Convention of a figure: a code and its values (tankcal.record.camera_analyses).
+    """Convention of a figure: a code and its values (tankcal.record.camera).
 
     Example: "focal_same", {"of": "first"}.
     """

@@ -1,8 +1,7 @@
 """File formats of scanners, one module per format: check of the header, reading of the points."""
 
-from tankcal.clouds.contents import WHOLE
 from tankcal.clouds.formats import columns, e57, las, lines, ply
-from tankcal.clouds.formats.files import find_format
+from tankcal.clouds.formats.files import WHOLE, find_format
 
 _DESCRIBE = {
     "las": las.describe,

@@ -4,8 +4,14 @@ import re
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from tankcal.clouds.contents import WHOLE, CloudPiece, ScanHeader
-from tankcal.clouds.formats.files import Piece, count_mismatch, no_points
+from tankcal.clouds.formats.files import (
+    WHOLE,
+    CloudPiece,
+    Piece,
+    ScanHeader,
+    count_mismatch,
+    no_points,
+)
 from tankcal.clouds.formats.lines import (
     BLOCK,
     COMMENTS,

@@ -8,8 +8,15 @@ from xml.parsers import expat
 
 import numpy as np
 
-from tankcal.clouds.contents import WHOLE, CloudPiece, ScanHeader
-from tankcal.clouds.formats.files import Piece, describe_cut, no_points, require_library
+from tankcal.clouds.formats.files import (
+    WHOLE,
+    CloudPiece,
+    Piece,
+    ScanHeader,
+    describe_cut,
+    no_points,
+    require_library,
+)
 from tankcal.clouds.formats.isolation import decode_frames
 from tankcal.messages import message
 

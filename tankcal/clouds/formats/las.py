@@ -9,10 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.clouds.contents import WHOLE, ScanHeader
 from tankcal.clouds.formats.files import (
     EXTENT_LIMIT,
+    WHOLE,
     Piece,
+    ScanHeader,
     count_mismatch,
     describe_cut,
     divide_records,

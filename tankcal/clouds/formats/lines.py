@@ -15,8 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.clouds.contents import ScanHeader
-from tankcal.clouds.formats.files import Piece, count_mismatch, no_points
+from tankcal.clouds.formats.files import Piece, ScanHeader, count_mismatch, no_points
 from tankcal.messages import message
 
 BLOCK = 1 << 22  # bytes read at a time

@@ -5,8 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.clouds.contents import WHOLE, ScanHeader
-from tankcal.clouds.formats.files import Piece, count_mismatch, divide_records, no_points
+from tankcal.clouds.formats.files import (
+    WHOLE,
+    Piece,
+    ScanHeader,
+    count_mismatch,
+    divide_records,
+    no_points,
+)
 from tankcal.clouds.formats.lines import Layout, Lines, parse_rows, printable_start, skip_lines
 from tankcal.messages import message
 

@@ -46,9 +46,8 @@ import scipy.linalg
 
 from tankcal.adjust import CRITICAL, snoop
 from tankcal.geometry.field.amplitudes import likely_variances
-from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M, invert
-from tankcal.geometry.field.sites import MOST_SITES, free_design
+from tankcal.geometry.field.sites import MOST_SITES, Covariances, free_design
 from tankcal.units import FULL_TURN
 
 MOST_ROUNDS = 4  # rounds: amplitudes from the accepted readings, then tests of all readings

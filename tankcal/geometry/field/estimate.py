@@ -66,9 +66,8 @@ from tankcal.geometry.field.components import (
     wave_columns,
     weld_columns,
 )
-from tankcal.geometry.field.covariances import Covariances, clip_to_semidefinite
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M
-from tankcal.geometry.field.sites import Sites, free_design
+from tankcal.geometry.field.sites import Covariances, Sites, clip_to_semidefinite, free_design
 from tankcal.quadrature import panels
 from tankcal.units import FULL_TURN
 

@@ -31,8 +31,8 @@ import scipy.sparse
 from tankcal.geometry.field.amplitudes import Amplitudes, most_likely
 from tankcal.geometry.field.blunders import judge_by_others, restricted_precision
 from tankcal.geometry.field.components import wave_columns
-from tankcal.geometry.field.covariances import clip_to_semidefinite
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M, Likelihood, Part, prior_of
+from tankcal.geometry.field.sites import clip_to_semidefinite
 from tankcal.units import FULL_TURN
 
 WRAPS = np.arange(-2, 3)  # turns over which a short covariance is summed to make it periodic

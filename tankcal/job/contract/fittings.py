@@ -82,7 +82,10 @@ def check_deadwood(table, extent, log):
 
 def _check_sign(table, row, name, volume, log):
     """Check that the sign of the volume agrees with the name of the item."""
-    takes, gives = (_has_word(name, words) for words in (TAKES_ROOM, GIVES_ROOM))
+    takes, gives = (
+        any(re.search(rf"\b{re.escape(word)}", name.lower()) for word in words)
+        for words in (TAKES_ROOM, GIVES_ROOM)
+    )
     values = {"volume_m3": volume, "name": name}
     if volume > 0 and takes and not gives:
         text = message(
@@ -109,11 +112,6 @@ def _check_sign(table, row, name, volume, log):
     else:
         return
     log.warning(table.file, text, row, "volume_m3")
-
-
-def _has_word(name, words):
-    """Determine whether a word of the name begins with any of `words`."""
-    return any(re.search(rf"\b{re.escape(word)}", name.lower()) for word in words)
 
 
 def _check_place(table, row, bottom, top, volume, extent, log):

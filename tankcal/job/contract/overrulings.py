@@ -172,7 +172,9 @@ def names_of_points(tables):
             names += [f"{setup} {row}" for setup, row in sights]
     if not names and any(has_rows(tables[name]) for name in READINGS):
         return None  # the wall is selected from adjusted points
-    if not names and not any(has_rows(tables[name]) for name in _tables_without_names()):
+    unnamed = [method.tables for method in methods() if not method.has_named_points]
+    without_names = (*_WALL_WITHOUT_NAMES, *(table for tables_of in unnamed for table in tables_of))
+    if not names and not any(has_rows(tables[name]) for name in without_names):
         return None  # missing or unreadable wall, reported elsewhere
     return dict.fromkeys(names)
 
@@ -243,9 +245,3 @@ def _is_correlated(pairs, reading_table, reading_row):
         return False
     ends = (zip(pairs.of(f"table_{i}"), pairs.of(f"row_{i}"), strict=True) for i in "12")
     return any((reading_table, reading_row) in end for end in ends)
-
-
-def _tables_without_names():
-    """Names of tables that determine a wall without points that could be named."""
-    unnamed = [method.tables for method in methods() if not method.has_named_points]
-    return (*_WALL_WITHOUT_NAMES, *(table for tables in unnamed for table in tables))

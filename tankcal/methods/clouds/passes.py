@@ -23,8 +23,7 @@ from functools import cache
 import numpy as np
 
 from tankcal.clouds import CloudPiece, estimate_count, pieces_of, read_cloud
-from tankcal.clouds.contents import WHOLE
-from tankcal.clouds.formats.files import count_mismatch, open_cloud
+from tankcal.clouds.formats.files import WHOLE, count_mismatch, open_cloud
 from tankcal.clouds.wall.cells import WallCells
 from tankcal.clouds.wall.passes import sample_points, sum_cells
 from tankcal.errors import InputError, Problem

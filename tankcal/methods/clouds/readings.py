@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tankcal.clouds.formats.files import CloudHeader
 from tankcal.errors import InputError
 from tankcal.job.checking import has_rows, is_not_given, missing_beside, name_twice, tell
 from tankcal.job.checks.extent import has_survey, sights_given, tells_by_tape
@@ -23,12 +24,12 @@ from tankcal.methods.clouds.columns import (
     REGISTRATION,
     UNITS_M,
 )
-from tankcal.survey.scans import KnownTargets, ScanSetup, ScanTarget
+from tankcal.survey.registration import KnownTargets, ScanSetup, ScanTarget
 from tankcal.survey.wall_hits import RangingInstrument
 from tankcal.units import ARCSEC
 
 if TYPE_CHECKING:
-    from tankcal.clouds.contents import CloudHeader
+    from tankcal.clouds.formats.files import CloudHeader
 
 FEWEST_TARGETS = 3  # smallest number of targets that determine the pose of a scan
 RIGID = 1e-4  # largest deviation of a pose from a rotation, due to rounding

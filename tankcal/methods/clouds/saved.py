@@ -392,7 +392,7 @@ def shared_part_of(table):
 
 def _map(cells, zero_m):
     """`CloudMap` of the cells of a wall, with heights above the table's zero."""
-    from tankcal.clouds.wall.readings import unroll_wall
+    from tankcal.clouds.wall.cells import unroll_wall
 
     wall = unroll_wall(cells)
     rows = zip(wall.departure_tenths_mm.tolist(), wall.is_shown.tolist(), strict=True)

@@ -19,14 +19,13 @@ from tankcal.methods.clouds.columns import UNITS_M
 from tankcal.methods.clouds.overlaps import normals_of, overlap_test, overlaps_of, scans_apart
 from tankcal.methods.clouds.passes import Placing, Reading, Telling, open_passes
 from tankcal.methods.clouds.readings import offset_untold
-from tankcal.pipeline.checks.survey import causes_unlike_certificates
+from tankcal.pipeline.checks import causes_unlike_certificates
 from tankcal.pipeline.scanned_solids import fit_scan
 from tankcal.pipeline.wall.finding import find_wall, joints_of, through_wall
 from tankcal.pipeline.wall.shared_unknowns import estimate_causes
 from tankcal.pipeline.wall.surveyed import s_transform
 from tankcal.survey.beams import BeamPoints, points_of_beams
-from tankcal.survey.registration import Registration, register
-from tankcal.survey.scans import KnownTargets
+from tankcal.survey.registration import KnownTargets, Registration, register
 
 FILE, TARGETS = "clouds.toml", "scan_targets.csv"
 MOST_READINGS = 1200  # largest number of mean points, because of their full covariance

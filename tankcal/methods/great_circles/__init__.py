@@ -87,7 +87,7 @@ class GreatCirclesMethod(Method):
 
     # ---- report
 
-    report_tables = Import("tankcal.methods.great_circles.tables")
+    report_tables = Import("tankcal.methods.great_circles.saved")
 
     def csv_tables(self, record):
         return {"great_circles": self.report_tables().CIRCLES}
@@ -98,6 +98,6 @@ class GreatCirclesMethod(Method):
         return [("great_circles", "great_circles_subtitle", tables)]
 
     def certificates(self, saved):
-        from tankcal.methods.strapping.tables import certificates_of_tapes
+        from tankcal.methods.strapping.saved import certificates_of_tapes
 
         return certificates_of_tapes(saved["tapes"])

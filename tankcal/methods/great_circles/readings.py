@@ -39,7 +39,10 @@ def check_great_circles(values, tables, registers, raw, log, *, is_given):
         return
     tapes = tapes_of(registers)
     _check_circles(table, log)
-    check_readings(_as_straps(table), tables, registers, raw, log)
+    # The columns have the names of circumferences; a great circle is taped in one pull.
+    columns = {"circumference": table.columns["circle"], "pulls": None}
+    straps = replace(table, columns=table.columns | columns)
+    check_readings(straps, tables, registers, raw, log)
     if has_wall_points(tables):
         expected = message(
             "circles_beside_points",
@@ -61,12 +64,6 @@ def check_great_circles(values, tables, registers, raw, log, *, is_given):
         )
     if values is not None:
         _check_settings(values, table, tapes, raw, log)
-
-
-def _as_straps(table):
-    """Readings with the column names of circumferences; a great circle is taped in one pull."""
-    columns = {"circumference": table.columns["circle"], "pulls": None}
-    return replace(table, columns=table.columns | columns)
 
 
 def _check_circles(table, log):

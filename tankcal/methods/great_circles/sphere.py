@@ -26,8 +26,8 @@ from tankcal.messages import message
 from tankcal.methods.great_circles.columns import KINDS
 from tankcal.methods.strapping import warnings
 from tankcal.methods.strapping.warnings import FAR_LIMITS, check_repeats, limit_of_repeats
+from tankcal.pipeline.checks import limits_of_method
 from tankcal.pipeline.checks.size import allowed_departure_m, single_radius
-from tankcal.pipeline.checks.survey import limits_of_method
 from tankcal.pipeline.read_wall import (
     WallReading,
     factors_of_readings,

@@ -89,7 +89,7 @@ class HitsMethod(Method):
 
     # ---- report
 
-    report_tables = Import("tankcal.methods.hits.tables")
+    report_tables = Import("tankcal.methods.hits.saved")
 
     def sheets(self, record):
         declared = self.report_tables()

@@ -290,7 +290,7 @@ def levels_of_hits(job):
 
 def observe_hits(job, wall, errors):
     """Return hits along their own sights, up to the inside or outside of the wall."""
-    from tankcal.survey.sighting import bias_by_incidence, rays
+    from tankcal.survey.wall_hits import bias_by_incidence, rays
 
     hits, levels = job.hits, levels_of_hits(job)
     station, ray = _stations_of_hits(hits)[:, :2], rays(hits.direction_rad, hits.zenith_rad)[0]

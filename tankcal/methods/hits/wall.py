@@ -23,7 +23,7 @@ from tankcal.sections import coordinates_of
 from tankcal.survey import wall_points
 from tankcal.survey.diagnosis.misread_files import OTHER_UNITS
 from tankcal.survey.poses import covariance_with_points, poses_of, sees_all_around, settle_poses
-from tankcal.survey.sighting import Beside, rays, sight
+from tankcal.survey.wall_hits import Beside, rays, sight
 from tankcal.units import DEG_IN_GON, FULL_TURN, GON_IN_DEG
 
 FEWEST_AROUND = 3  # smallest number of stations that show their side of the wall

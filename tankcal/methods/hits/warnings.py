@@ -20,7 +20,7 @@ from tankcal.methods.moved_setups import (
     moved_or_ranged,
     worst_setup,
 )
-from tankcal.pipeline.checks.survey import (
+from tankcal.pipeline.checks import (
     causes_unlike_certificates,
     limit_at,
     limits_of,
@@ -35,7 +35,7 @@ from tankcal.pipeline.checks.wall import (
 )
 from tankcal.pipeline.wall.finding import joints_of
 from tankcal.pipeline.wall.shared_unknowns import noise_of_wall
-from tankcal.survey.sighting import NETWORK, WALL, certified_m, rays
+from tankcal.survey.wall_hits import NETWORK, WALL, certified_m, rays
 from tankcal.units import FULL_TURN, GON, HOUR_S
 
 RULES, CONTROL = "wall_hits", "control_readings.csv"

@@ -61,7 +61,7 @@ class InsideHitsMethod(Method):
 
     # ---- report
 
-    report_tables = Import("tankcal.methods.inside_hits.tables")
+    report_tables = Import("tankcal.methods.inside_hits.saved")
 
     def sheets(self, record):
         declared = self.report_tables()

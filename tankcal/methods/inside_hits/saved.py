@@ -1,7 +1,8 @@
-"""Saved part of wall hits inside horizontal tanks and spheres."""
+"""Saved part of wall hits inside horizontal tanks and spheres, and the tables that print it."""
 
 import numpy as np
 
+from tankcal.methods.hits import saved as of_upright_tanks
 from tankcal.methods.hits.saved import (
     HitSetupUsed,
     IncidenceClass,
@@ -9,6 +10,7 @@ from tankcal.methods.hits.saved import (
     setups_used,
 )
 from tankcal.record.schema import Saved, key
+from tankcal.report.tables.table import DEPARTURE, ROW, SETUP, Table
 
 
 class ComparedInside(Saved):
@@ -50,3 +52,22 @@ def _compare_hits(hits, xyz_m, fit):
         ComparedInside(setup=hits.setup[index], departure_m=departure, row=hits.rows[index])
         for index, departure in zip(compared, departures_m, strict=True)
     ]
+
+
+SETUPS = Table(
+    "hit_setups",
+    of_upright_tanks.SETUPS.columns,
+    rows=lambda record: record["inside_hits"]["setups"],
+)
+
+INCIDENCE = Table(
+    "hit_incidence",
+    of_upright_tanks.INCIDENCE.columns,
+    rows=lambda record: record["inside_hits"]["incidence"],
+)
+
+COMPARED = Table(
+    "inside_hits_compared",
+    (SETUP, ROW, DEPARTURE),
+    rows=lambda record: record["inside_hits"]["compared"],
+)

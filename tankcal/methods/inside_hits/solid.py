@@ -21,17 +21,17 @@ from functools import partial
 import numpy as np
 
 from tankcal.errors import InputError, Problem
-from tankcal.geometry.cylinders import FittedCylinder
+from tankcal.geometry.primitives import FittedCylinder
 from tankcal.messages import list_some, message
 from tankcal.methods.hits.warnings import check_control, check_incidence
 from tankcal.methods.inside_hits.readings import offset_undeclared, untied_setup
-from tankcal.pipeline.checks.survey import limits_of_method
+from tankcal.pipeline.checks import limits_of_method
 from tankcal.pipeline.overruling import decisions_of
 from tankcal.pipeline.scanned_solids import NEVER_M, NEVER_PART, fit_scan, offsets
 from tankcal.pipeline.wall.finding import take_points
 from tankcal.pipeline.wall.surveyed import s_transform
 from tankcal.survey.poses import poses_in_network, poses_of
-from tankcal.survey.sighting import WALL, sight
+from tankcal.survey.wall_hits import WALL, sight
 from tankcal.units import FULL_TURN
 
 ROUNDS = 6  # largest number of fits; two or three suffice

@@ -102,7 +102,7 @@ class LinesMethod(Method):
 
     # ---- report
 
-    report_tables = Import("tankcal.methods.lines.tables")
+    report_tables = Import("tankcal.methods.lines.saved")
 
     def csv_tables(self, record):
         return {"offsets": self.report_tables().OFFSETS}

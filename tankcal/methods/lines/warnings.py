@@ -15,7 +15,7 @@ from tankcal.adjust import SD_OVER_MEDIAN
 from tankcal.errors import Problem
 from tankcal.geometry.outlines import harmonics
 from tankcal.messages import message
-from tankcal.pipeline.checks.survey import limit_at, limits_of, repeat_factor
+from tankcal.pipeline.checks import limit_at, limits_of, repeat_factor
 from tankcal.survey.reference_line import (
     collimation_by_faces,
     lean_of,

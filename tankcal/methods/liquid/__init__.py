@@ -75,7 +75,7 @@ class LiquidMethod(Method):
         return job.tank.kind == "vertical" and job.points is None
 
     def find(self, job, progress, network):
-        from tankcal.pipeline.liquid.body import find_nominal_wall
+        from tankcal.pipeline.liquid import find_nominal_wall
         from tankcal.pipeline.surveying import Surveyed
 
         return Surveyed(job, find_nominal_wall(job, progress))

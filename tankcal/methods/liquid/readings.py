@@ -38,7 +38,7 @@ from tankcal.methods.liquid.columns import (
     TEMPERATURES,
 )
 from tankcal.methods.liquid.runs import CHECK, check_runs, place_runs, steps_of
-from tankcal.tank.liquid.reduction import MOST_ROWS
+from tankcal.tank.liquid import MOST_ROWS
 
 FAHRENHEIT_ZERO, FAHRENHEIT_STEP = 32.0, 5 / 9
 L_MIN_PER_M3_H = 1000 / 60

@@ -99,16 +99,18 @@ def _meter(paper, meter):
     return paper.word("texts.liquid_prover", meter=text, prover=meter["prover"])
 
 
-def _certified_table_text(paper, row):
-    liquid = paper.record.get("liquid")
-    return liquid and paper.word(f"liquid_tables.{liquid['certified']}")
-
-
 FACTS = (  # of certificate and workbook
     Column("metered", text=_liquid_sentence, sheet=True),
     Column("metered_liquid", text=_liquid_properties, sheet=True),
     Column("metered_with", text=_meter_sentence, sheet=True),
-    Column("metered_table", text=_certified_table_text, sheet=True),
+    Column(
+        "metered_table",
+        text=lambda paper, row: (
+            (liquid := paper.record.get("liquid"))
+            and paper.word(f"liquid_tables.{liquid['certified']}")
+        ),
+        sheet=True,
+    ),
 )
 
 
@@ -237,11 +239,6 @@ def _convert_units(rows, keys):
     return converted
 
 
-def _sizes(record):
-    rows = record["liquid"]["sizes"]
-    return _convert_units(rows, ("change", "u_before", "u_after"))
-
-
 _UNIT = _column("shown_unit", "unit", width=8)
 
 SIZES = Table(
@@ -253,7 +250,9 @@ SIZES = Table(
         _column("u_before", "u_before", digits=2),
         _UNIT,
     ),
-    rows=_sizes,
+    rows=lambda record: _convert_units(
+        record["liquid"]["sizes"], ("change", "u_before", "u_after")
+    ),
 )
 
 

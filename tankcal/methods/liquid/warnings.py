@@ -6,7 +6,7 @@ from tankcal.adjust import CRITICAL
 from tankcal.errors import Problem
 from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import message
-from tankcal.pipeline.checks.survey import limits_of_method
+from tankcal.pipeline.checks import limits_of_method
 from tankcal.pipeline.liquid.measuring import causes_in_words, is_steady_leak, leak_unit
 
 TOLD = 3  # largest number of steps reported individually

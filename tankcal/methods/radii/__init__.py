@@ -95,8 +95,8 @@ class RadiiMethod(Method):
 
     # ---- report
 
-    report_tables = Import("tankcal.methods.radii.tables")
-    report_figures = Import("tankcal.methods.radii.tables")
+    report_tables = Import("tankcal.methods.radii.saved")
+    report_figures = Import("tankcal.methods.radii.saved")
 
     def sheets(self, record):
         return [("radii", "radii_subtitle", [("radii", self.report_tables().RADII)])]

@@ -34,13 +34,13 @@ from tankcal.methods.strapping.warnings import (
     read_once,
     straps_apart,
 )
+from tankcal.pipeline.checks import limits_of
 from tankcal.pipeline.checks.size import (
     InsideRadii,
     allowed_departure_m,
     check_side,
     departure_of_size,
 )
-from tankcal.pipeline.checks.survey import limits_of
 from tankcal.pipeline.read_wall import names_of, readings_of_straps
 from tankcal.pipeline.tanks.solid import factor_of_unseen, inside_end, is_warmed, thermal_scale
 from tankcal.pipeline.wall_straps import (

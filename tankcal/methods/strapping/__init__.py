@@ -123,7 +123,7 @@ class StrappingMethod(Method):
 
     # ---- report
 
-    report_tables = Import("tankcal.methods.strapping.tables")
+    report_tables = Import("tankcal.methods.strapping.saved")
 
     def csv_tables(self, record):
         return {"strapping": self.report_tables().straps_of(record)}

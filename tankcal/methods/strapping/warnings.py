@@ -16,6 +16,7 @@ from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.methods.base import accompanying_methods, completing_method
 from tankcal.methods.moved_setups import precision_and_pull
+from tankcal.pipeline.checks import limit_at, limits_of
 from tankcal.pipeline.checks.size import (
     allowed_departure_m,
     check_side,
@@ -23,7 +24,6 @@ from tankcal.pipeline.checks.size import (
     is_size_declared,
     nominal_radius_m,
 )
-from tankcal.pipeline.checks.survey import limit_at, limits_of
 from tankcal.pipeline.read_wall import FORMER
 from tankcal.pipeline.wall_straps import course_apart, exchanged_courses
 from tankcal.units import STANDARD_GRAVITY

@@ -102,7 +102,7 @@ class TangentsMethod(Method):
 
     # ---- report
 
-    report_tables = Import("tankcal.methods.tangents.tables")
+    report_tables = Import("tankcal.methods.tangents.saved")
 
     def sheets(self, record):
         declared = self.report_tables()

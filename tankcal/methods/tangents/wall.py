@@ -29,7 +29,7 @@ from tankcal.methods.moved_setups import (
     least_tangents,
     worst_setup,
 )
-from tankcal.pipeline.checks.survey import limits_of
+from tankcal.pipeline.checks import limits_of
 from tankcal.pipeline.checks.wall import (
     check_nominal,
     check_size_measured,
@@ -42,8 +42,8 @@ from tankcal.pipeline.wall.surveyed import s_transform
 from tankcal.pipeline.wall_straps import rings_of
 from tankcal.survey.diagnosis.misread_files import OTHER_UNITS
 from tankcal.survey.poses import poses_in_network
-from tankcal.survey.sighting import WALL
 from tankcal.survey.tangents import Hull, circle_of_sights, halfway, round_hull, touch
+from tankcal.survey.wall_hits import WALL
 from tankcal.units import DEG_IN_GON, FULL_TURN, GON_IN_DEG
 
 ROUNDS = 6  # rounds of wall and excess; two suffice unless the hull dominates the form

@@ -30,7 +30,7 @@ from tankcal.job.plausibility import (
 )
 from tankcal.messages import list_some, message
 from tankcal.methods.base import given_methods, method_of
-from tankcal.pipeline.checks.survey import limits_of, origin_of
+from tankcal.pipeline.checks import limits_of, origin_of
 from tankcal.pipeline.wall_straps import mean_radii
 
 SHOWN = 5  # courses named in a message

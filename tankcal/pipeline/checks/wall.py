@@ -25,17 +25,12 @@ from tankcal.geometry.field.amplitudes import bartlett
 from tankcal.geometry.field.components import COMPONENTS
 from tankcal.messages import list_some, message
 from tankcal.methods.base import given_methods, is_size_measured
+from tankcal.pipeline.checks import LARGE_NOISE_M, SHOWN, locate_at_points, noise_is_estimated
 from tankcal.pipeline.checks.size import (
     allowed_departure_m,
     inside_radii,
     is_size_declared,
     nominal_radius_m,
-)
-from tankcal.pipeline.checks.survey import (
-    LARGE_NOISE_M,
-    SHOWN,
-    locate_at_points,
-    noise_is_estimated,
 )
 from tankcal.pipeline.wall.surveyed import tell_undecided
 

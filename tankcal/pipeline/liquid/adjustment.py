@@ -19,7 +19,7 @@ import numpy as np
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import message
-from tankcal.pipeline.liquid.body import (
+from tankcal.pipeline.liquid import (
     Known,
     Loaded,
     column_of,
@@ -31,15 +31,16 @@ from tankcal.tank.liquid import (
     Effect,
     Fill,
     LiquidAdjustment,
+    ReadingEffects,
     ReducedSteps,
     RunEffect,
     adjust_steps,
     estimate_run_effect,
     fill_of,
+    load_densities,
     reading_effects,
     reduce_steps,
 )
-from tankcal.tank.liquid.reduction import ReadingEffects, load_densities
 from tankcal.uncertainty import Source, type_of
 
 MOST_ROUNDS, SETTLED = 30, 1e-3  # largest number of steps of the sizes, and size of the last in sds

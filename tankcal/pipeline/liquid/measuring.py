@@ -16,6 +16,7 @@ from scipy.special import gammaincc
 from tankcal.adjust import noncentrality
 from tankcal.errors import InputError, SolutionError
 from tankcal.messages import join_with_or, message
+from tankcal.pipeline.liquid import filled_range_m, geometry_alone, geometry_beside, join_body
 from tankcal.pipeline.liquid.adjustment import (
     BOTTOM,
     FLEX,
@@ -24,10 +25,17 @@ from tankcal.pipeline.liquid.adjustment import (
     adjust_liquid,
     adjusted_at,
 )
-from tankcal.pipeline.liquid.body import filled_range_m, geometry_alone, geometry_beside, join_body
 from tankcal.pipeline.tanks import Correction, body_of, filled_with, zero_height
-from tankcal.tank.liquid import Alternative, Verdict, fill_of, name_causes, reduce_steps
-from tankcal.tank.liquid.reduction import as_fahrenheit, batch_sd_m3, swapped
+from tankcal.tank.liquid import (
+    Alternative,
+    Verdict,
+    as_fahrenheit,
+    batch_sd_m3,
+    fill_of,
+    name_causes,
+    reduce_steps,
+    swapped,
+)
 from tankcal.uncertainty import combine
 
 

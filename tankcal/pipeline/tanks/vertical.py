@@ -162,14 +162,10 @@ def shell_zero(job, wall):
     if datum.dip_plate_z_m is not None:
         return datum.plate_level_m
     if job.bottom.form == "leaning" and job.switches.bottom and datum.dip_x_m is not None:
-        offset = np.array([datum.dip_x_m, datum.dip_y_m]) - _axis_at_bottom(job, wall)
-        return -float(offset @ wall.shell.slope)
+        axis_m, slope = np.array(wall.shell.axis_m), np.array(wall.shell.slope)
+        axis_at_bottom = axis_m + (datum.bottom_z_m - wall.shell.z_m) * slope
+        return -float((np.array([datum.dip_x_m, datum.dip_y_m]) - axis_at_bottom) @ slope)
     return 0.0
-
-
-def _axis_at_bottom(job, wall):
-    shell = wall.shell
-    return np.array(shell.axis_m) + (job.datum.bottom_z_m - shell.z_m) * np.array(shell.slope)
 
 
 def critical_zone(job):

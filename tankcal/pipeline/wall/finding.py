@@ -20,7 +20,7 @@ from tankcal.methods.base import (
     given_methods,
     is_sighted,
 )
-from tankcal.pipeline.checks.survey import (
+from tankcal.pipeline.checks import (
     limits_of,
     noise_is_estimated,
     origin_of,
@@ -191,7 +191,8 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
         points = PointsOfWall(sites, radius, noise, unbound, by_inputs)
         read, straps = join_readings(job, points, amplitudes, joints, is_known=is_known)
         field, count = read.field, len(read.accepted)
-        by_points = _pad_rows(by_points, count)
+        rows_of_others = scipy.sparse.csr_array((count, by_points.shape[1]))  # zeros
+        by_points = scipy.sparse.vstack([by_points, rows_of_others], format="csr")
         by_inputs = {name: np.pad(column, (0, count)) for name, column in by_inputs.items()}
         undecided = np.pad(undecided, ((0, count), (0, 0)))
     estimated_unknowns = None
@@ -251,12 +252,6 @@ def _derivatives_by_inputs(points, by_points, accepted):
     """{input of the budget: derivative (n,) of the radii}, for inputs that affect the points."""
     index = coordinates_of(accepted)
     return {name: by_points @ column[index] for name, column in points.by_inputs.items()}
-
-
-def _pad_rows(by_points, more):
-    """Derivatives of readings by points (n, 3 m), with rows of zeros for `more` other readings."""
-    empty = scipy.sparse.csr_array((more, by_points.shape[1]))
-    return scipy.sparse.vstack([by_points, empty], format="csr")
 
 
 def _clear_of_welds(job, shell, decided):

@@ -1,10 +1,8 @@
-"""Wall of a tank surveyed by points, with additional straps and reference lines.
+"""Upright wall surveyed by points, with additional straps and reference lines.
 
-Columns of points that belong either to the wall or to a fitting, and their uncertainty.
-
-The table lies midway between the wall with such a column and the wall without it. Half of the
-difference is the standard uncertainty, as for a quantity with two equally probable values. U is
-about twice this half and covers both.
+Some columns of points belong either to the wall or to a fitting. The table lies midway between the
+wall with such a column and the wall without it. Half of the difference is the standard uncertainty,
+as for a quantity with two equally probable values. U is about twice this half and covers both.
 """
 
 from dataclasses import dataclass, field, replace

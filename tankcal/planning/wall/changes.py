@@ -6,11 +6,11 @@ from itertools import pairwise
 import numpy as np
 
 from tankcal.methods.base import count_readings, given_methods
+from tankcal.planning.model import USUAL_AT, PlannedStrap, even_radius_m
 from tankcal.planning.wall.filling import LEAST_STEP_M, SAME_M
-from tankcal.planning.wall.model import USUAL_AT, PlannedStrap, even_radius_m
 from tankcal.planning.wall.reading import change_plan, least_ring_m, lengths_of_bars
 from tankcal.survey.tangents import FEWEST_SETUPS
-from tankcal.tank.liquid.reduction import MOST_ROWS
+from tankcal.tank.liquid import MOST_ROWS
 
 OF_FILLING = ("step", "top_of_run", "half_steps", "empty_start", "run")
 SEARCHED = (
@@ -243,7 +243,8 @@ def _runs(plan):
         if len(halves) > len(run.dips_m) and _count_rows(runs) + len(halves) < MOST_ROWS:
             yield "add", "half_steps", name, change_run(dips_m=halves)
         if len(run.dips_m) > 2:
-            yield "drop", "half_steps", name, change_run(dips_m=_every_second(run.dips_m))
+            kept = run.dips_m[: len(run.dips_m) - 1 : 2]  # every second dip, and the last dip
+            yield "drop", "half_steps", name, change_run(dips_m=(*kept, run.dips_m[-1]))
         if not run.from_empty and run.dips_m[0] < run.dips_m[-1]:
             yield "add", "empty_start", name, change_run(from_empty=True)
         if _count_rows(runs) + len(run.dips_m) < MOST_ROWS:
@@ -305,12 +306,6 @@ def _halves(dips):
             halved.append(middle)
         halved.append(high)
     return tuple(halved)
-
-
-def _every_second(dips):
-    """Return every second dip and the last dip."""
-    kept = dips[::2]
-    return kept if kept[-1] == dips[-1] else (*kept, dips[-1])
 
 
 def _halve_dip_sd(plan, number, run):

@@ -16,7 +16,7 @@ from tankcal.survey.reference_line import MOST_OFFSETS
 from tankcal.survey.strapping import MOST_STRAPS
 from tankcal.survey.tangents import MOST_TANGENTS
 from tankcal.survey.wall_hits import MOST_HITS
-from tankcal.tank.liquid.reduction import MOST_ROWS
+from tankcal.tank.liquid import MOST_ROWS
 
 OFF_WALL_M = 0.2  # distance of a reference line from the wall
 USUAL_BAR_M = 2.0  # length of an undescribed stadia; the job reports the missing description

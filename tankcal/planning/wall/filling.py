@@ -14,10 +14,10 @@ import numpy as np
 from tankcal.adjust import noncentrality
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.pipeline.liquid.body import filled_range_m, join_body
+from tankcal.pipeline.liquid import filled_range_m, join_body
 from tankcal.planning.contract import PLAN_FILE, too_many_sections
-from tankcal.planning.wall.model import PlannedRun
-from tankcal.tank.liquid.reduction import MOST_ROWS
+from tankcal.planning.model import PlannedRun
+from tankcal.tank.liquid import MOST_ROWS
 from tankcal.uncertainty import combine
 
 LEAST_STEP_M = 0.001  # smallest step between two dips

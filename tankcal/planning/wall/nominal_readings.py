@@ -34,12 +34,11 @@ import numpy as np
 
 from tankcal.geometry.field.blunders import restricted_precision
 from tankcal.geometry.field.components import COMPONENTS, Heights, mode_shares, weld_columns
-from tankcal.geometry.field.covariances import Covariances
-from tankcal.geometry.field.sites import free_design, spans_of
+from tankcal.geometry.field.sites import Covariances, free_design, spans_of
 from tankcal.geometry.girth import draw_waves, girth_of, modes_of, nodes_of, tangent_excess
 from tankcal.methods.base import given_methods, with_readings
+from tankcal.pipeline.liquid import geometry_beside, load_geometry
 from tankcal.pipeline.liquid.adjustment import adjust_liquid
-from tankcal.pipeline.liquid.body import geometry_beside, load_geometry
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.wall_straps import area_term
 from tankcal.planning.measurements import draw_blunders
@@ -47,8 +46,7 @@ from tankcal.planning.wall.design_tables import azimuth_of_axis, limb_of_circle
 from tankcal.quadrature import panels
 from tankcal.survey.observations import KINDS
 from tankcal.survey.readings import read_distance_m
-from tankcal.tank.liquid import fill_of, reduce_steps
-from tankcal.tank.liquid.reduction import load_densities
+from tankcal.tank.liquid import fill_of, load_densities, reduce_steps
 from tankcal.units import FULL_TURN
 
 UNKNOWN_OFFSET_M = 2e-3  # sd of the offset of an instrument without a prior

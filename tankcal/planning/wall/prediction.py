@@ -12,19 +12,19 @@ from tankcal.geometry.field.estimate import LEVELS
 from tankcal.job.model import Job
 from tankcal.methods.base import count_readings, given_methods, supplement_of
 from tankcal.pipeline.checks.wall import OF_SCATTER
-from tankcal.pipeline.liquid.body import NominalWall
+from tankcal.pipeline.liquid import NominalWall
 from tankcal.pipeline.liquid.measuring import LiquidResult, Measured
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.table import ComputedTable, check_table, compute_table, statements
 from tankcal.pipeline.wall.shared_unknowns import noise_of_wall
 from tankcal.pipeline.wall_straps import TapedWall
+from tankcal.planning.model import WallPlan
 from tankcal.planning.table import TableResults, refuse_without_delivery
 from tankcal.planning.wall.filling import (
     FillingOutlook,
     outlook_of_filling,
     refuse_other_dips,
 )
-from tankcal.planning.wall.model import WallPlan
 from tankcal.planning.wall.nominal_readings import expect_amplitudes
 from tankcal.planning.wall.reading import locate_in_plan
 from tankcal.quadrature import panels

@@ -22,16 +22,7 @@ from tankcal.planning.contract import (
     no_such_name,
     too_many_sections,
 )
-from tankcal.planning.places import (
-    check_obstacles,
-    message_of_cut_line,
-    message_of_misplaced_station,
-    message_of_obstacle_at,
-    obstacles_of,
-)
-from tankcal.planning.wall.design_tables import DesignTables
-from tankcal.planning.wall.filling import check_runs, runs_of
-from tankcal.planning.wall.model import (
+from tankcal.planning.model import (
     USUAL_AT,
     Design,
     PlannedControl,
@@ -43,6 +34,15 @@ from tankcal.planning.wall.model import (
     even_radius_m,
     evenness_of_limbs,
 )
+from tankcal.planning.places import (
+    check_obstacles,
+    message_of_cut_line,
+    message_of_misplaced_station,
+    message_of_obstacle_at,
+    obstacles_of,
+)
+from tankcal.planning.wall.design_tables import DesignTables
+from tankcal.planning.wall.filling import check_runs, runs_of
 from tankcal.planning.wall.nominal_readings import set_nominal_readings
 from tankcal.survey.reference_line import MOST_OFFSETS, too_many_offsets
 from tankcal.survey.strapping import MOST_STRAPS, too_many_straps
@@ -408,8 +408,15 @@ def design_of(plan_input, courses, celsius=None):
     celsius : float, optional
         Temperature of the table.
     """
+    more = ("instrument", "temperature_c", "tension_n", "pulls")
     straps = (
-        PlannedStrap(course, percent, entry["s_mm"], int(entry["readings"] or 1), _more(entry))
+        PlannedStrap(
+            course,
+            percent,
+            entry["s_mm"],
+            int(entry["readings"] or 1),
+            tuple((key, entry[key]) for key in more if entry[key] is not None),
+        )
         for entry in plan_input.sections["straps"]
         for course in entry["courses"] or courses
         for percent in percents_of(entry)
@@ -437,11 +444,6 @@ def design_of(plan_input, courses, celsius=None):
         tangents=_tangents(plan_input.sections["tangents"], plan_input.sections["traverse"]),
         runs=runs_of(plan_input.sections["runs"], celsius),
     )
-
-
-def _more(entry):
-    keys = ("instrument", "temperature_c", "tension_n", "pulls")
-    return tuple((key, entry[key]) for key in keys if entry[key] is not None)
 
 
 def _lines(entry):

@@ -14,7 +14,7 @@ from pathlib import Path
 from tankcal.errors import InputError, Problem, TankcalError, reason_of
 from tankcal.messages import message
 from tankcal.products.app.access import ROLES
-from tankcal.terminal.showing import language_of_run, say, speak
+from tankcal.terminal import language_of_run, say, speak
 from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import load_words
 

@@ -23,14 +23,15 @@ from starlette.routing import Mount, Route
 
 from tankcal.errors import InputError, TankcalError
 from tankcal.products.app.access import APPROVE, EDIT, LANGUAGE_COOKIE, REPORT_POLICY, RUN
-from tankcal.products.app.folders import pack_sent_folder
 from tankcal.products.app.office_pages import (
     add_logs,
     compare_upload,
     create_from_chart,
     create_service,
+    decide,
     draw_chart,
     end_session,
+    issue_certificate,
     list_services,
     open_sent_job,
     send_document,
@@ -38,10 +39,12 @@ from tankcal.products.app.office_pages import (
     show_chart,
     show_login,
     show_register,
+    show_review,
     show_service,
     show_services,
     show_upload,
     start_session,
+    take_over,
     view_record,
     withdraw_certificate,
 )
@@ -66,7 +69,7 @@ from tankcal.products.app.pages import (
     show_refusal,
     upload_of,
 )
-from tankcal.products.app.review_pages import decide, issue_certificate, show_review, take_over
+from tankcal.products.app.site import pack_sent_folder
 from tankcal.text.shipped import LANGUAGES, shipped_folder
 
 FOLDER = Path(__file__).parent
@@ -782,7 +785,7 @@ async def show_quantity(request):
         raise HTTPException(404)
 
     def make():
-        from tankcal.products.desk.ticket_form import answer_ticket, ticket_sections
+        from tankcal.products.desk.calculators import answer_ticket, ticket_sections
 
         paper = read_paper(job, language)
         return ticket_sections(paper), *answer_ticket(paper, dict(request.query_params))
@@ -802,18 +805,18 @@ async def show_what_if(request):
     query = request.query_params
 
     def make():
-        from tankcal.products.desk import what_if
+        from tankcal.products.desk import calculators
 
         paper = read_paper(job, language)
-        known = what_if.list_recorded_budgets(paper)
+        known = calculators.list_recorded_budgets(paper)
         numbers = {str(number): number for number, _ in known}
         if not numbers:
             return {"budgets": [], "number": None, "lines": [], "sentences": [], "table": ""}
         number = numbers.get(query.get("budget"), known[0][0])
-        changed = what_if.change_recorded_budget(paper, number, read_factors(query))
+        changed = calculators.change_recorded_budget(paper, number, read_factors(query))
         return {
-            "budgets": known, "number": number, "sentences": what_if.budget_sentences(
-                paper, changed), "table": Markup(what_if.table_html(paper, changed)),
+            "budgets": known, "number": number, "sentences": calculators.budget_sentences(
+                paper, changed), "table": Markup(calculators.table_html(paper, changed)),
             "lines": [(name, factor, paper.number(factor, decimals=2))
                       for name, factor in zip(changed.names, changed.factors, strict=True)],
         }  # fmt: skip
@@ -824,7 +827,7 @@ async def show_what_if(request):
 
 def read_factors(query):
     """Factors {index of a line: factor} of a query, within the range of the sliders."""
-    from tankcal.products.desk.what_if import LARGEST
+    from tankcal.products.desk.calculators import LARGEST
 
     factors = {}
     for name, text in query.items():

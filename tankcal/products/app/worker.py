@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tankcal.errors import TankcalError, reason_of
 from tankcal.products.desk.computing import Run
-from tankcal.terminal.showing import prepare_for_small_work
+from tankcal.terminal import prepare_for_small_work
 from tankcal.text.shipped import LANGUAGES
 from tankcal.text.words import load_words, say
 

@@ -2,13 +2,15 @@
 
 from pathlib import Path
 
-from tankcal.terminal.arguments import add_language, add_letterhead, read_letterhead
-from tankcal.terminal.showing import (
+from tankcal.terminal import (
     Progress,
     add_json,
+    add_language,
+    add_letterhead,
     language_of_run,
     print_json,
     print_paths,
+    read_letterhead,
     say,
     speak,
 )

@@ -5,23 +5,21 @@ from pathlib import Path
 
 from tankcal.errors import TankcalError, problem_from
 from tankcal.messages import message
-from tankcal.terminal.arguments import (
-    add_language,
-    add_letterhead,
-    parse_worker_memory,
-    parse_workers,
-)
-from tankcal.terminal.showing import (
+from tankcal.terminal import (
     Progress,
     add_json,
+    add_language,
+    add_letterhead,
     complain,
     language_of_run,
+    parse_worker_memory,
+    parse_workers,
     print_json,
     print_paths,
     say,
+    signal_status,
     speak,
 )
-from tankcal.terminal.stopping import signal_status
 
 GIGABYTE = 1 << 30
 
@@ -112,7 +110,7 @@ def add(commands):
 
 def _batch(options):
     speak(options.language)
-    from tankcal.products.batch.options import Options, parse_steps
+    from tankcal.products.batch.outcomes import Options, parse_steps
     from tankcal.products.batch.running import run_batch
 
     batch_options = Options(

@@ -31,8 +31,7 @@ from tankcal.job.tables import (
     read_bytes,
 )
 from tankcal.messages import message
-from tankcal.products.batch.options import LIST_OPTIONS, Options
-from tankcal.products.batch.outcomes import read_known_names
+from tankcal.products.batch.outcomes import LIST_OPTIONS, Options, read_known_names
 from tankcal.text.delimited import split_cells
 from tankcal.text.naming import file_name
 
@@ -272,7 +271,11 @@ def _find_listed(path, target, log):
     if text is None:
         return []
     problems_before = len(log.problems)
-    rows = list(_csv_rows(path, text, log)) if is_csv else _plain_rows(text.splitlines())
+    if is_csv:
+        rows = list(_csv_rows(path, text, log))
+    else:  # one job per line
+        lines = map(str.strip, text.splitlines())
+        rows = [{"job": line} for line in lines if line and not line.startswith("#")]
     jobs = []
     for cells in rows:
         job = cells.pop("job")
@@ -289,12 +292,6 @@ def _find_listed(path, target, log):
             message("batch_empty_list", "the list contains no jobs; expected one job per row"),
         )
     return jobs
-
-
-def _plain_rows(lines):
-    """Return the rows of a list with one job per line."""
-    stripped = (line.strip() for line in lines)
-    return [{"job": text} for text in stripped if text and not text.startswith("#")]
 
 
 def _csv_rows(path, text, log):

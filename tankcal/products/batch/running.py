@@ -32,14 +32,16 @@ from tankcal.methods.clouds.cluster import (
 )
 from tankcal.products.batch.finding import find_former_or_none, find_jobs
 from tankcal.products.batch.journal import compute_keys, open_folder
-from tankcal.products.batch.options import FOLDERS, refuse_incomplete, refuse_unreadable
 from tankcal.products.batch.outcomes import (
+    FOLDERS,
     JOBS,
     Outcome,
     StepOutcome,
     is_summary_row,
     load_outcome,
     read_known_names,
+    refuse_incomplete,
+    refuse_unreadable,
     save_outcome,
 )
 from tankcal.products.batch.steps import Task, do_job

@@ -14,8 +14,8 @@ from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import message
 from tankcal.products.batch.finding import RECORD, SAVED, BatchJob, find_former, find_former_or_none
 from tankcal.products.batch.journal import JOURNAL, Journal, compute_keys
-from tankcal.products.batch.options import FOLDERS
 from tankcal.products.batch.outcomes import (
+    FOLDERS,
     MOST_REPORTED,
     Outcome,
     StepOutcome,
@@ -254,7 +254,7 @@ def _export(task, clock):
 def _upkeep(task, clock):
     from tankcal.products.upkeep.paper import DOCUMENT
     from tankcal.products.upkeep.reading import read_upkeep
-    from tankcal.products.upkeep.state import State
+    from tankcal.products.upkeep.saved import State
     from tankcal.products.upkeep.upkeep import keep_up
     from tankcal.record import save
     from tankcal.record.schema import to_plain

@@ -5,7 +5,7 @@ import time
 
 from tankcal.errors import TankcalError
 from tankcal.messages import message
-from tankcal.terminal.showing import describe_progress
+from tankcal.terminal import describe_progress
 
 
 class Refusal(TankcalError):

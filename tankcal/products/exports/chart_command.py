@@ -4,13 +4,7 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message, printable
-from tankcal.terminal.arguments import add_language, parse_several
-from tankcal.terminal.showing import (
-    add_json,
-    print_json,
-    say,
-    speak_of_record,
-)
+from tankcal.terminal import add_json, add_language, parse_several, print_json, say, speak_of_record
 
 
 def add(commands):

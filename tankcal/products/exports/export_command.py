@@ -4,10 +4,12 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message, printable
-from tankcal.terminal.arguments import add_language, parse_positive, parse_several
-from tankcal.terminal.showing import (
+from tankcal.terminal import (
     add_json,
+    add_language,
     language_of_run,
+    parse_positive,
+    parse_several,
     print_json,
     say,
     speak,

@@ -9,11 +9,13 @@ from pathlib import Path
 from tankcal.errors import InputError, Problem, problem_of
 from tankcal.job.tables import SETTINGS_FILE, WORKBOOK_FILE
 from tankcal.messages import message, printable
-from tankcal.terminal.arguments import add_language, parse_positive, refuse_argument
-from tankcal.terminal.showing import (
+from tankcal.terminal import (
     add_json,
+    add_language,
     complain,
+    parse_positive,
     print_json,
+    refuse_argument,
     say,
     say_in_language,
     speak,
@@ -134,7 +136,7 @@ def _time(text):
 
 
 def _import(options):
-    from tankcal.terminal.showing import read_job_language
+    from tankcal.terminal import read_job_language
 
     options.out = options.out or _folder_here(options.names)
     folder = Path(options.out)

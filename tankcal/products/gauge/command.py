@@ -3,14 +3,16 @@
 from pathlib import Path
 
 from tankcal.messages import message
-from tankcal.terminal.arguments import add_language, add_letterhead, read_letterhead
-from tankcal.terminal.showing import (
+from tankcal.terminal import (
     Progress,
     add_json,
+    add_language,
+    add_letterhead,
     language_of_run,
     marks,
     print_paths,
     print_saved,
+    read_letterhead,
     say,
     speak,
     warn,

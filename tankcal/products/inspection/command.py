@@ -1,11 +1,12 @@
 """`tankcal inspect`: plumb, roundness, welds and settlement of a tank from its survey."""
 
 from tankcal.messages import message
-from tankcal.terminal.arguments import add_language, parse_yield
-from tankcal.terminal.showing import (
+from tankcal.terminal import (
     Progress,
     add_json,
+    add_language,
     language_of_run,
+    parse_yield,
     print_saved,
     say,
     speak,
@@ -70,7 +71,7 @@ def add(commands):
 
 
 def _inspect(options):
-    from tankcal.terminal.showing import read_job_language, read_record_language
+    from tankcal.terminal import read_job_language, read_record_language
 
     speak(
         options.language

@@ -447,7 +447,7 @@ def find_gaps(result, limits_mm, reading=None, progress=None):
 
     Parameters
     ----------
-    result : tankcal.pipeline.result.Result
+    result : tankcal.pipeline.chain.Result
         Result for an upright tank. The files of its clouds are read again.
     limits_mm : dict
         Limits of the rule, {"peaking": mm, "banding": mm}. A missing key is an unknown limit.

@@ -3,14 +3,16 @@
 from pathlib import Path
 
 from tankcal.messages import message
-from tankcal.terminal.arguments import add_language, parse_count, refuse_argument
-from tankcal.terminal.showing import (
+from tankcal.terminal import (
     Progress,
     add_json,
+    add_language,
     language_of_run,
     marks,
+    parse_count,
     print_paths,
     print_saved,
+    refuse_argument,
     say,
     say_in_language,
     speak,
@@ -229,7 +231,7 @@ def _answer(options):
 
 def _score(options):
     speak(options.language)
-    from tankcal.products.intercomparison.scoring import score_folders
+    from tankcal.products.intercomparison.answers import score_folders
     from tankcal.record.schema import to_plain
 
     if options.out is not None:

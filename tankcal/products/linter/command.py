@@ -2,8 +2,7 @@
 
 from tankcal.errors import InputError, Problem, problem_of
 from tankcal.messages import message
-from tankcal.terminal.arguments import add_language, parse_positive
-from tankcal.terminal.showing import add_json, print_json, say, speak
+from tankcal.terminal import add_json, add_language, parse_positive, print_json, say, speak
 
 MOST_FINDINGS = 50  # that are shown at once
 

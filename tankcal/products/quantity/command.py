@@ -4,10 +4,10 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem, problem_of
 from tankcal.messages import message, printable
-from tankcal.terminal.arguments import add_language
-from tankcal.terminal.showing import (
+from tankcal.terminal import (
     Progress,
     add_json,
+    add_language,
     language_of_run,
     marks,
     print_json,
@@ -112,7 +112,7 @@ def _check_output(path, is_folder, is_single):
 
 def _write_document(tickets, folder, show):
     """Write the document of a single ticket and return the names of its files."""
-    from tankcal.products.quantity.saving import document_file
+    from tankcal.products.quantity.results import document_file
     from tankcal.report.ticket import write_ticket
 
     written = write_ticket(document_file(tickets), folder, language_of_run(), show.step)
@@ -125,7 +125,7 @@ def _write_documents(tickets, folder, show):
 
     Returns the names of the folders and of the PDF.
     """
-    from tankcal.products.quantity.saving import document_file
+    from tankcal.products.quantity.results import document_file
     from tankcal.report.ticket import refuse_foreign, write_ticket
     from tankcal.report.ticket.pages import BOOKLET, refuse_foreign_booklet, write_booklet
     from tankcal.text.naming import file_name
@@ -182,7 +182,7 @@ def _write_new(options, table):
 
 def _tell(tickets):
     """Print the steps, quantities, budget and comparison of a single ticket."""
-    from tankcal.products.quantity.saving import ticket_file
+    from tankcal.products.quantity.results import ticket_file
     from tankcal.record.schema import to_plain
     from tankcal.report.ticket import TicketPaper
     from tankcal.report.ticket.pages import comparison_text, room_texts, step_text

@@ -263,7 +263,7 @@ class Tickets:
         if len(self.names) > 1:
             raise ValueError(f"found {len(self.names)} tickets; expected a single ticket, such as "
                              "tickets.single(0)")  # fmt: skip
-        from tankcal.products.quantity.saving import document_file
+        from tankcal.products.quantity.results import document_file
         from tankcal.report.ticket import write_ticket
 
         return write_ticket(document_file(self), folder, language)

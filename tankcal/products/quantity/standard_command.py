@@ -4,10 +4,12 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message, printable
-from tankcal.terminal.arguments import add_language, parse_number, parse_several
-from tankcal.terminal.showing import (
+from tankcal.terminal import (
     add_json,
+    add_language,
     language_of_run,
+    parse_number,
+    parse_several,
     print_json,
     say,
     speak_of_record,
@@ -67,10 +69,12 @@ def add(commands):
 
 
 def _standard(options):
-    from tankcal.products.quantity.standard_table import compute_standard_table
+    from tankcal.products.quantity.standard_table import (
+        compute_standard_table,
+        write_standard_table,
+    )
     from tankcal.products.quantity.table import read_table
     from tankcal.report.outputs import record_file
-    from tankcal.report.standard_volumes import write_standard_table
     from tankcal.text.naming import file_name
 
     source = record_file(options.record)
@@ -107,7 +111,7 @@ def _check_lists(options):
 
 def _check_output(path, count):
     """Refuse an unknown kind of file, and too many temperatures for a page."""
-    from tankcal.report.standard_volumes import MOST_COLUMNS, SUFFIXES
+    from tankcal.products.quantity.standard_table import MOST_COLUMNS, SUFFIXES
 
     if path.suffix.lower() not in SUFFIXES or path.is_dir():
         text = message("standard_out", "expected the name of a .csv, .pdf or .xlsx file")

@@ -1,10 +1,10 @@
 """`tankcal compare`: comparison of a former and a new table of one tank."""
 
 from tankcal.messages import message
-from tankcal.terminal.arguments import add_language
-from tankcal.terminal.showing import (
+from tankcal.terminal import (
     Progress,
     add_json,
+    add_language,
     language_of_run,
     marks,
     print_saved,

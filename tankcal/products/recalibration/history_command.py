@@ -1,12 +1,13 @@
 """`tankcal history`: tables of one tank over the years."""
 
 from tankcal.messages import message
-from tankcal.terminal.arguments import add_language, parse_dips
-from tankcal.terminal.showing import (
+from tankcal.terminal import (
     Progress,
     add_json,
+    add_language,
     language_of_run,
     marks,
+    parse_dips,
     print_saved,
     say,
     speak_of_record,

@@ -3,10 +3,11 @@
 from pathlib import Path
 
 from tankcal.messages import message
-from tankcal.terminal.arguments import add_language, parse_positive
-from tankcal.terminal.showing import (
+from tankcal.terminal import (
+    add_language,
     language_of_run,
     marks,
+    parse_positive,
     print_paths,
     say,
     speak_of_record,
@@ -66,7 +67,7 @@ def add(commands):
 def _read_table(options):
     speak_of_record(options.language, options.file)
     from tankcal.products.recalibration.read_table import read_table
-    from tankcal.report.table_job import refuse_foreign_job, write_job
+    from tankcal.products.recalibration.table_job import refuse_foreign_job, write_job
 
     if options.out is not None:
         refuse_foreign_job(options.out)

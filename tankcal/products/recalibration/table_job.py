@@ -3,6 +3,7 @@
 import datetime
 import io
 import json
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,8 +11,11 @@ import numpy as np
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.products.recalibration.solid_geometry import size_sections, uncertainty_rows
+from tankcal.report.folders import refuse_foreign, replace_folder
 from tankcal.report.saved_document import iso_day
 from tankcal.text.delimited import write_guarded
+from tankcal.text.shipped import DEFAULT
+from tankcal.text.words import load_words, say
 
 USUAL_TEMPERATURE_C = 20.0
 UNKNOWN_ZERO_M = 0.02
@@ -398,3 +402,55 @@ def _extrapolate_row(rows, area_m2, floor_m):
         return empty, 0.0
     dip = min(floor_m, low - EMPTY_BELOW_M)
     return dip, max(slope * (dip - empty), 0.0)
+
+
+SETTINGS = "job.toml"
+COVARIANCE = "radii_cov.npz"
+FILES = (
+    *(SETTINGS, "courses.csv", "radii.csv", COVARIANCE, "bottom.csv", "deadwood.csv"),
+    "uncertainty.csv",
+)
+
+
+def refuse_foreign_job(directory):
+    """Raise InputError if `directory` contains files that `write_job` does not write."""
+    refuse_foreign(directory, FILES)
+
+
+def write_job(job, directory, language=DEFAULT):
+    """Write the files of a `JobOfTable`, all or none.
+
+    Parameters
+    ----------
+    job : JobOfTable
+        Content of the job.
+    directory : str or Path
+        Folder of the job.
+    language : str, optional
+        Code of the language of the papers.
+
+    Returns
+    -------
+    list of str
+        Names of the files.
+    """
+    has_radii = job.covariance_m2 is not None
+    names = [name for name in FILES if name in job.texts or (name == COVARIANCE and has_radii)]
+    with replace_folder(directory) as folder:
+        words = load_words(language)
+        for name, text in job.texts.items():
+            for item in job.words:  # messages in the text
+                pair = (str(item), say(words, item))
+                english, translation = (json.dumps(part, ensure_ascii=False)[1:-1] for part in pair)
+                pattern = rf"(?<![\w-]){re.escape(english)}(?![\w-])"
+                text = re.sub(pattern, lambda _, translation=translation: translation, text)
+            if name == SETTINGS and language != DEFAULT:
+                text = text.replace("[table]\n", f'[table]\nlanguage = "{language}"\n', 1)
+            (folder / name).write_text(text, encoding="utf-8")
+        if has_radii:
+            np.savez(
+                folder / COVARIANCE,
+                covariance_m2=job.covariance_m2,
+                courses=np.array(job.courses, dtype=str),
+            )
+    return names

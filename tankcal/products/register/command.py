@@ -4,14 +4,7 @@ from datetime import date
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.terminal.arguments import add_language
-from tankcal.terminal.showing import (
-    add_json,
-    print_json,
-    say,
-    speak,
-    speak_of_record,
-)
+from tankcal.terminal import add_json, add_language, print_json, say, speak, speak_of_record
 
 
 def add(commands):

@@ -5,8 +5,7 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message, printable
-from tankcal.terminal.arguments import add_language
-from tankcal.terminal.showing import language_of_run, speak
+from tankcal.terminal import add_language, language_of_run, speak
 
 
 def add(commands):

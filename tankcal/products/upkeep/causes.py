@@ -14,7 +14,7 @@ import numpy as np
 
 from tankcal.products.quantity.chain import table_shell_factor
 from tankcal.products.upkeep.filtering import Drift
-from tankcal.products.upkeep.state import hash_arrays
+from tankcal.products.upkeep.saved import hash_arrays
 from tankcal.tank.service import shell_factor
 
 YEAR_S = 365.25 * 86400

@@ -4,14 +4,16 @@ import os
 from pathlib import Path
 
 from tankcal.messages import message
-from tankcal.terminal.arguments import add_language, add_letterhead, read_letterhead
-from tankcal.terminal.showing import (
+from tankcal.terminal import (
     Progress,
     add_json,
+    add_language,
+    add_letterhead,
     language_of_run,
     marks,
     print_paths,
     print_saved,
+    read_letterhead,
     say,
     speak,
     warn,
@@ -80,7 +82,7 @@ def _upkeep(options):
         return
     from tankcal.products.upkeep.paper import DOCUMENT, UpkeepPaper
     from tankcal.products.upkeep.reading import read_upkeep
-    from tankcal.products.upkeep.state import State
+    from tankcal.products.upkeep.saved import State
     from tankcal.products.upkeep.upkeep import keep_up
     from tankcal.record.schema import to_plain
 

@@ -21,7 +21,7 @@ from tankcal.products.upkeep.filtering import (
     total_innovations,
     whiten_steps,
 )
-from tankcal.products.upkeep.state import NO_STATE
+from tankcal.products.upkeep.saved import NO_STATE
 
 PERIOD_NS = 182 * 86400 * 10**9
 PASSES = 8  # largest number of linearisations

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from tankcal.messages import message
-from tankcal.products.upkeep.clocks import NOT_A_TIME
+from tankcal.products.upkeep.logs import NOT_A_TIME
 
 TOTAL_M3 = 1e-4  # largest difference of a rise of a counter from its transaction
 ROLLOVER = 0.01  # a total that falls from above 99 % to below 1 % of a power of ten rolled over

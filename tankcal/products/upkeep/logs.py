@@ -1,8 +1,10 @@
-"""Rows of logs, read in chunks: CSV files by a profile, and captures of TLS consoles.
+"""Logs of gauges and meters: their profiles, their local times, and their rows in chunks.
 
-A chunk is a mapping {column: values}. Numbers are in SI units, times are nanoseconds UTC. Only the
-columns of the profile are read. Rows that cannot be used are counted by kind, with the first and
-the last time; no value is corrected.
+A profile (TOML) declares the columns, units and times of a file. Rows are read from CSV files by a
+profile, or from captures of TLS consoles. A chunk is a mapping {column: values} with the columns of
+the profile only: numbers in SI units, times in nanoseconds UTC, also in the doubled hour of autumn.
+Rows that cannot be used are counted by kind, with the first and the last time; no value is
+corrected.
 """
 
 import csv
@@ -11,15 +13,292 @@ import struct
 from collections import defaultdict
 from dataclasses import dataclass, field
 from itertools import islice
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from tankcal.job.folder import is_row, separator_of_text
-from tankcal.job.tables import Log, unreadable_file
+from tankcal.job.entries import read_section
+from tankcal.job.fields import Field, choice, number
+from tankcal.job.folder import MAX_SETTINGS_BYTES, is_row, read_toml, separator_of_text
+from tankcal.job.tables import Log, nearest, read_bytes, unreadable_file
 from tankcal.messages import message
-from tankcal.products.upkeep.clocks import NOT_A_TIME, LocalClock
-from tankcal.products.upkeep.profiles import KINDS, QUANTITIES, LogProfile
+from tankcal.products.exports.profiles import LEVEL_UNITS_M, VOLUMES_M3
+from tankcal.text.shipped import shipped_folder
+
+MOST_OFFSET_S, OFFSET_STEP_S = 7200, 60  # searched offsets of two clocks
+LEAST_SALES = 30  # for an offset
+MOST_STEP_M3 = 0.3  # change of the stock in a row beyond it: a delivery
+LARGEST_MISFIT = 0.6  # of a right offset, relative to that of an offset two hours away
+SWITCH_NS = 900 * 10**9  # smallest fall of a local time that is the change of the clock
+NOT_A_TIME = np.iinfo(np.int64).min  # NaT as an integer
+
+
+class LocalClock:
+    """Converts local times of a log to UTC, batch by batch in the order of its rows.
+
+    An hour that occurs twice is resolved by the order of the rows: rows before a fall of the local
+    time are in summer time, rows from the fall on in standard time.
+
+    Parameters
+    ----------
+    zone : str
+        IANA name of the time zone.
+
+    Attributes
+    ----------
+    unresolved : int
+        Number of rows in a doubled hour without a fall of the local time; they have no time.
+    """
+
+    def __init__(self, zone):
+        self.zone, self.unresolved = zone, 0
+
+    def convert(self, local_ns):
+        """Convert local times to UTC.
+
+        Parameters
+        ----------
+        local_ns : ndarray of int64, shape (n,)
+            Nanoseconds since 1970 of the local clock; NOT_A_TIME: none.
+
+        Returns
+        -------
+        utc_ns : ndarray of int64, shape (n,)
+            NOT_A_TIME where the local time is missing, unresolved or does not exist.
+        is_impossible : ndarray of bool, shape (n,)
+            Local times in the hour that is skipped in spring.
+        """
+        times = pd.DatetimeIndex(local_ns.view("datetime64[ns]"))
+        if len(times) == 0:
+            return local_ns.copy(), np.zeros(0, dtype=bool)
+        # A later offset is that of standard time; both offsets differ in a doubled hour only.
+        early, late = (
+            times.tz_localize(self.zone, ambiguous=np.full(len(times), is_summer),
+                              nonexistent="NaT").asi8
+            for is_summer in (True, False)
+        )  # fmt: skip
+        is_impossible = (early == NOT_A_TIME) & (local_ns != NOT_A_TIME)
+        doubled = np.flatnonzero(early != late)
+        utc = early.copy()
+        # Stretches of rows in a doubled hour: the local times of a stretch are within 3 h.
+        ends = np.flatnonzero(np.diff(local_ns[doubled]) > 3 * 3600 * 10**9) + 1
+        for rows in np.split(doubled, ends) if len(doubled) else ():
+            falls = np.flatnonzero(np.diff(local_ns[rows]) < -SWITCH_NS)
+            if len(falls):
+                utc[rows[falls[0] + 1 :]] = late[rows[falls[0] + 1 :]]
+            else:
+                self.unresolved += len(rows)
+                utc[rows] = NOT_A_TIME
+        return utc, is_impossible
+
+    def is_doubled(self, local_ns):
+        """Whether each local time (n,) occurs twice."""
+        times = pd.DatetimeIndex(local_ns.view("datetime64[ns]"))
+        marked = times.tz_localize(self.zone, ambiguous="NaT", nonexistent="shift_forward")
+        return (marked.asi8 == NOT_A_TIME) & (local_ns != NOT_A_TIME)
+
+
+def find_offset_s(time_ns, stock_m3, flows, last_s=None):
+    """Estimate how late the clock of a level log is, by falls of the level and metered volumes.
+
+    Stock and metered volume have a constant sum between deliveries. The sum of the absolute changes
+    from row to row is least at the right offset.
+
+    Parameters
+    ----------
+    time_ns : ndarray of int64, shape (n,)
+        Ascending.
+    stock_m3 : ndarray, shape (n,)
+    flows : sequence of flows.MeterFlow
+    last_s : float, optional
+        Offset of earlier rows. It is kept without a search if it fits better than its neighbours.
+
+    Returns
+    -------
+    float or None
+        Seconds; None with too few sales.
+    """
+    change, middles, volumes, margin = np.diff(stock_m3), [], [], MOST_OFFSET_S * 10**9
+    for flow in flows:
+        low = np.searchsorted(flow.time_ns, time_ns[0] - margin)
+        high = np.searchsorted(flow.time_ns, time_ns[-1] + 2 * margin)
+        middles.append(flow.begin_ns[low:high] // 2 + flow.time_ns[low:high] // 2)
+        volumes.append(np.diff(flow.total_m3[low : high + 1]))
+    middle = np.concatenate([np.zeros(0, dtype=np.int64), *middles])
+    if np.sum((middle > time_ns[0]) & (middle < time_ns[-1])) < LEAST_SALES:
+        return None
+    order = np.argsort(middle, kind="stable")
+    middle, total = middle[order], np.append(0.0, np.cumsum(np.concatenate(volumes)[order]))
+
+    def misfit(offset):
+        at = time_ns - int(offset) * 10**9
+        sold = total[np.searchsorted(middle, at)]
+        return np.minimum(np.abs(change + np.diff(sold)), MOST_STEP_M3).sum()
+
+    if last_s is not None:
+        best, *near = (misfit(last_s + OFFSET_STEP_S * step) for step in (0, -2, -1, 1, 2))
+        # A wrong offset may be better than its neighbours by chance, but not than all sales.
+        if best < min(near) and best < LARGEST_MISFIT * misfit(last_s + MOST_OFFSET_S):
+            return last_s
+    offsets = np.arange(-MOST_OFFSET_S, MOST_OFFSET_S + 1, OFFSET_STEP_S)
+    return float(offsets[np.argmin([misfit(offset) for offset in offsets])])
+
+
+LENGTHS_M = {name: float(LEVEL_UNITS_M[name]) for name in ("m", "cm", "mm", "ft", "in")}
+LITRES_M3 = {name: float(size) for name, size in VOLUMES_M3.items()}
+FORMATS = ("csv", "tls-inventory", "tls-delivery")
+QUANTITIES = {  # column: quantity that decides its unit
+    "time": None, "begin": "time", "end": "time", "level": "length", "water": "length",
+    "volume": "volume", "total": "volume", "temperature": "temperature",
+    "start_volume": "volume", "end_volume": "volume", "offset": "number", "value": "number",
+    "tank": None, "meter": None, "ticket": None, "kind": None, "quality": None, "tag": None,
+}  # fmt: skip
+KINDS = {  # log: needed columns, of each group any
+    "levels": (("time",), ("level", "tag")),
+    "meters": (("time",), ("total", "volume")),
+    "deliveries": (("time",), ("volume", "start_volume")),
+    "events": (("time",), ("kind",)),
+    "air": (("time",), ("temperature",)),
+}
+FIELDS = {
+    "profile": (
+        Field("source", "text", "where the format was read"),
+        choice("format", "of the file", FORMATS),
+    ),
+    "columns": tuple(Field(name, "text", "heading") for name in QUANTITIES),
+    "units": (
+        choice("length", "of levels", tuple(LENGTHS_M)),
+        choice("volume", "of volumes", tuple(LITRES_M3)),
+        choice("temperature", "of temperatures", ("c", "f")),
+    ),
+    "file": (
+        choice("separator", "between the columns", (",", ";", "\t", "|")),
+        choice("decimal", "mark of decimals", (".", ",")),
+        Field("time_format", "text", "as for strftime; blank: ISO 8601"),
+        Field("encoding", "text", "of the text"),
+        Field("headings", "names", "headings in order, of a file without a heading"),
+        number("skip_rows", "rows above the heading", 0, 1000),
+        Field("missing", "names", "words in place of a number"),
+        Field("good", "names", "words of the column quality for valid readings"),
+    ),
+    "tags": tuple(Field(name, "text", "tag") for name in ("level", "temperature", "water")),
+    "only": (Field("tank", "text", "value of the column tank"),),
+}
+_FOLDER = "products/upkeep/shipped_profiles"
+
+
+@dataclass(frozen=True)
+class LogProfile:
+    """Description of the files of a log.
+
+    Attributes
+    ----------
+    format : str
+        A value of FORMATS.
+    columns : dict
+        {key of QUANTITIES: heading}.
+    units : dict
+        {"length", "volume" or "temperature": unit}.
+    file : dict
+        Keys of the section [file], without blanks.
+    tags : dict
+        {"level", "temperature" or "water": tag} of a file with a tag in each row.
+    only : dict
+        {"tank": text} of the rows to be read.
+    """
+
+    format: str
+    columns: dict
+    units: dict
+    file: dict = field(default_factory=dict)
+    tags: dict = field(default_factory=dict)
+    only: dict = field(default_factory=dict)
+
+    def to_si(self, column, values):
+        """Values of a column in m, m3 or degC."""
+        quantity = QUANTITIES[column]
+        if quantity == "length":
+            return values * LENGTHS_M[self.units["length"]]
+        if quantity == "volume":
+            return values * LITRES_M3[self.units["volume"]]
+        if quantity == "temperature" and self.units.get("temperature") == "f":
+            return (values - 32) / 1.8
+        return values
+
+
+def list_profiles():
+    """Shipped profiles, {name: path}."""
+    return {path.stem: path for path in sorted(Path(str(shipped_folder(_FOLDER))).glob("*.toml"))}
+
+
+def read_log_profile(name, kind, folder, log):
+    """Read a profile.
+
+    Parameters
+    ----------
+    name : str or None
+        Name of a shipped profile, or of a TOML file in the folder; None: the profile "plain".
+    kind : str
+        A key of KINDS.
+    folder : Path
+    log : Log
+
+    Returns
+    -------
+    LogProfile or None
+        None after a problem, which is in the log.
+    """
+    name = name or "plain"
+    shipped = list_profiles()
+    path = folder / name if name.endswith(".toml") else shipped.get(name)
+    if path is None:
+        text = message("upkeep_no_profile", "no profile {name}; expected a TOML file, or a name of "
+                       "{names}{guess}", name=name, names=", ".join(sorted(shipped)),
+                       guess=nearest(name, shipped))  # fmt: skip
+        return log.problem("upkeep.toml", text, None, f"{kind}.profile")
+    problems_here = Log()
+    data = read_bytes(path, problems_here, MAX_SETTINGS_BYTES)
+    content, rows = ({}, {}) if data is None else read_toml(path.name, data, problems_here)
+    values = {
+        section: {
+            key: value
+            for key, value in read_section(
+                path.name,
+                section,
+                fields,
+                content.get(section, {}),
+                rows.get(section),
+                problems_here,
+            ).items()
+            if value is not None
+        }
+        for section, fields in FIELDS.items()
+    }
+    profile = LogProfile(
+        values["profile"].get("format", "csv"), values["columns"],
+        {"temperature": "c"} | values["units"], values["file"], values["tags"], values["only"],
+    )  # fmt: skip
+    if profile.format == "csv" and not problems_here.problems:
+        _check_columns(path.name, profile, kind, name == "plain", problems_here)
+    log.problems.extend(problems_here.problems)
+    return None if problems_here.problems else profile
+
+
+def _check_columns(file, profile, kind, is_plain, log):
+    """Report missing columns and units of a profile."""
+    for group in KINDS[kind]:
+        if not is_plain and not any(column in profile.columns for column in group):
+            text = message("upkeep_profile_column", "missing; expected the heading of this column "
+                           "for {kind}", kind=kind)  # fmt: skip
+            log.problem(file, text, None, f"columns.{group[0]}")
+    for column in profile.columns:
+        quantity = QUANTITIES[column]
+        if quantity in ("length", "volume") and quantity not in profile.units:
+            text = message("upkeep_profile_unit", "missing; expected the unit of column {column}",
+                           column=column)  # fmt: skip
+            log.problem(file, text, None, f"units.{quantity}")
+
 
 CHUNK = 200_000  # rows
 MOST_BAD_ROWS = 3  # rows named in messages of a file

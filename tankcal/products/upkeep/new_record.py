@@ -18,7 +18,7 @@ from tankcal.pipeline.liquid.measuring import BALANCE, BY_LIQUID
 from tankcal.pipeline.tanks import Correction
 from tankcal.products.upkeep.estimation import estimate
 from tankcal.products.upkeep.reading import SETTINGS, read_upkeep
-from tankcal.products.upkeep.state import NO_STATE
+from tankcal.products.upkeep.saved import NO_STATE
 from tankcal.products.upkeep.upkeep import keep_up, update_table
 from tankcal.record.covariance_factor import blocks_of
 from tankcal.record.making import KeptUp, MeterByTank

@@ -429,5 +429,5 @@ DOCUMENT = SavedDocument(
     lambda: (pages, write_workbook),
     tables=FILES,
     has_page=False,
-    recomputed_by="tankcal.products.upkeep.recomputation:compute_again",
+    recomputed_by="tankcal.products.upkeep.upkeep:compute_again",
 )

@@ -22,10 +22,9 @@ from tankcal.products.quantity.table import read_table
 from tankcal.products.settings import EmptyFiles, fill_blanks, read_sections
 from tankcal.products.upkeep.causes import PRIORS, Meter, Operation, TableStock
 from tankcal.products.upkeep.flows import quiet_windows, read_flows
-from tankcal.products.upkeep.levels import MOST_OFFSET_S, LevelSums
-from tankcal.products.upkeep.logs import Findings, LogFile
-from tankcal.products.upkeep.own_table import compare_own_volumes, find_water
-from tankcal.products.upkeep.profiles import read_log_profile
+from tankcal.products.upkeep.levels import MOST_OFFSET_S, LevelSums, compare_own_volumes, find_water
+from tankcal.products.upkeep.logs import Findings, LogFile, read_log_profile
+from tankcal.products.upkeep.saved import NO_STATE
 from tankcal.products.upkeep.start import (
     DRAWING,
     SALES,
@@ -34,7 +33,6 @@ from tankcal.products.upkeep.start import (
     check_drawing,
     open_start,
 )
-from tankcal.products.upkeep.state import NO_STATE
 from tankcal.products.upkeep.steps import REASONS, StepRules, Tickets, build_steps
 from tankcal.record.manifest import digest_of
 from tankcal.text.shipped import LANGUAGES

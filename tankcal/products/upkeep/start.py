@@ -24,8 +24,7 @@ from tankcal.messages import message
 from tankcal.products.quantity.table import TankTable
 from tankcal.products.upkeep.causes import TableStock
 from tankcal.products.upkeep.estimation import estimate
-from tankcal.products.upkeep.saved import UpkeepCause, UpkeepSolution
-from tankcal.products.upkeep.state import NO_STATE, hash_arrays
+from tankcal.products.upkeep.saved import NO_STATE, UpkeepCause, UpkeepSolution, hash_arrays
 from tankcal.tank.heads import End
 from tankcal.tank.liquid.adjustment import ALIKE
 from tankcal.tank.solids import LyingTank
@@ -120,7 +119,7 @@ def open_start(source):
     folder, kind, files = source.parent, "job", ()
     if source.name != JOB:
         from tankcal.products.recalibration.read_table import read_table
-        from tankcal.report.table_job import write_job
+        from tankcal.products.recalibration.table_job import write_job
 
         kind, files = "table", [source]
         courses, facts = (source.parent / name for name in (COURSES, FORMER))

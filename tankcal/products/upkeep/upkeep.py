@@ -1,8 +1,9 @@
-"""The upkeep of a tank: new table, meters by the tank, months, watching, omitted rows."""
+"""The upkeep of a tank: new table, meters, months, watching, omitted rows, and its verification."""
 
 import hashlib
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import scipy.linalg
@@ -11,22 +12,24 @@ from tankcal.errors import Problem
 from tankcal.gum.coverage import coverage_factor
 from tankcal.messages import message
 from tankcal.products.quantity.table import TankTable
+from tankcal.products.recomputing import compare_values
 from tankcal.products.settings import drop_blanks
 from tankcal.products.upkeep import saved
 from tankcal.products.upkeep.estimation import LEAST_RANGE, LEAST_STEPS, estimate
 from tankcal.products.upkeep.filtering import whiten_steps
-from tankcal.products.upkeep.reading import SETTINGS
+from tankcal.products.upkeep.reading import SETTINGS, read_upkeep
+from tankcal.products.upkeep.saved import NO_STATE, UPKEEP
 from tankcal.products.upkeep.start import (
     CERTIFIED_RANGE,
     SALES,
     STOCK_PROBABILITY,
     estimate_sizes,
 )
-from tankcal.products.upkeep.state import NO_STATE
 from tankcal.products.upkeep.steps import REASONS
 from tankcal.products.upkeep.watching import SIR_SD, suspect_clock, watch
 from tankcal.record.covariance_factor import blocks_of
-from tankcal.record.schema import warnings_of
+from tankcal.record.manifest import digest_of
+from tankcal.record.schema import to_plain, warnings_of
 
 WIDE = 0.005  # relative u of the former contents above which only deliveries are stated
 GLOBAL_TEST = 1e-3  # least probability of chi-square for an improved table
@@ -413,3 +416,51 @@ def _chain(sources):
             source.kind, source.file, source.sha256, source.rows, _hour(source.first_ns),
             _hour(source.last_ns), chain))  # fmt: skip
     return files
+
+
+def compute_again(saved, folder):
+    """Compute a saved upkeep again from its logs.
+
+    Parameters
+    ----------
+    saved : dict
+        Content of upkeep.json.
+    folder : Path
+        Folder of the input files.
+
+    Returns
+    -------
+    count : int or None
+        Number of the compared values; None: the inputs are not in the folder.
+    problems : list of Problem
+        Differences.
+    notes : list of Message
+        Checks that were not possible.
+
+    Raises
+    ------
+    InputError
+        If the inputs are not those of an upkeep.
+    """
+    settings = Path(folder) / SETTINGS
+    digests = {file["sha256"] for file in saved["files"] if file["file"] == SETTINGS}
+    if not settings.is_file() or digest_of(settings) not in digests:
+        note = message(
+            "verify_upkeep_inputs",
+            "{folder} does not contain {settings} with the SHA-256 stated in {file}; the values "
+            "were not computed again",
+            folder=str(folder),
+            settings=SETTINGS,
+            file=UPKEEP.file,
+        )
+        return None, [], [note]
+    inputs = read_upkeep(settings, source=saved["inputs"]["upkeep"]["record"])
+    again = to_plain(keep_up(inputs, with_steps="steps" in saved))
+    return *compare_values(UPKEEP.file, _drop_texts(saved), _drop_texts(again)), []
+
+
+def _drop_texts(upkeep):
+    """Content of upkeep.json, without its version and the English texts of warnings."""
+    keys = ("file", "column", "code", "values")
+    warnings = [{key: warning[key] for key in keys} for warning in upkeep["warnings"]]
+    return {**upkeep, "warnings": warnings, "tankcal": ""}

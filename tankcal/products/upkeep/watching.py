@@ -25,7 +25,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.products.upkeep.clocks import OFFSET_STEP_S
 from tankcal.products.upkeep.filtering import (
     FilterState,
     add_rows,
@@ -33,8 +32,8 @@ from tankcal.products.upkeep.filtering import (
     total_innovations,
     whiten_steps,
 )
-from tankcal.products.upkeep.saved import UpkeepSuspect, UpkeepWatch
-from tankcal.products.upkeep.state import NO_STATE
+from tankcal.products.upkeep.logs import OFFSET_STEP_S
+from tankcal.products.upkeep.saved import NO_STATE, UpkeepSuspect, UpkeepWatch
 from tankcal.tank.liquid.adjustment import ALIKE
 
 DAY_S = 86400.0

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.terminal.showing import complain, say, speak
+from tankcal.terminal import complain, say, speak
 from tankcal.text.shipped import LANGUAGES
 from tankcal.version import install_command
 
@@ -44,7 +44,7 @@ def _write_notebook(options, out):
     """Return the path of the notebook of a job, after writing it or keeping manual changes."""
     from tankcal.products.desk.draft import Draft, source_of
     from tankcal.products.workbench.serving import notebook_path, write_notebook
-    from tankcal.terminal.showing import read_job_language
+    from tankcal.terminal import read_job_language
 
     language = options.language or read_job_language(options.job)
     if language is not None:

@@ -11,7 +11,7 @@ from textwrap import wrap
 
 from tankcal.messages import message
 from tankcal.record import manifest
-from tankcal.record.camera_versions import KINDS
+from tankcal.record.versions import CAMERA_KINDS
 from tankcal.report import folders
 from tankcal.report.camera.paper import CameraPaper, describe_origin
 from tankcal.report.outputs import write_rows
@@ -83,7 +83,7 @@ def write(result, directory, progress=None, language=None):
         for name, rows in _load_module(result).tables(result).items():
             if rows:
                 write_rows(rows, temporary / name)
-        others = [other for other in KINDS if other != kind]
+        others = [other for other in CAMERA_KINDS if other != kind]
         notebook = join_templates(RECORD, others, (TEMPLATE,), LANGUAGE=language)
         write_papers(
             notebook,

@@ -6,7 +6,7 @@ from pathlib import Path
 import tankcal
 from tankcal.errors import InputError, Problem, reason_of
 from tankcal.messages import message
-from tankcal.record.camera_versions import CAMERA
+from tankcal.record.versions import CAMERA
 from tankcal.report import blocks
 from tankcal.report.plain import Column, PlainPaper
 from tankcal.text.delimited import read_json

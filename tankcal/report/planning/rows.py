@@ -9,9 +9,9 @@ import numpy as np
 
 from tankcal.camera.model import PARAMETERS
 from tankcal.geometry.rotations import view_of_rotation
+from tankcal.planning.model import WallPlan
 from tankcal.planning.places import angle_of_base_rad, base_m, joints_m, place_of
 from tankcal.planning.wall.changes import instruments_in_use
-from tankcal.planning.wall.model import WallPlan
 from tankcal.planning.wall.nominal_readings import place_stations
 from tankcal.planning.wall.reading import lengths_of_bars, tables_of
 from tankcal.report.plain import Column

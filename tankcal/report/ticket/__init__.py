@@ -151,7 +151,7 @@ DOCUMENT = SavedDocument(
     _load_renderers,
     tables=TABLES,
     others={XML: _write_xml},
-    recomputed_by="tankcal.products.quantity.recomputation:compute_again",
+    recomputed_by="tankcal.products.quantity.ticketing:compute_again",
 )
 refuse_foreign = DOCUMENT.refuse_foreign
 write_ticket = DOCUMENT.write

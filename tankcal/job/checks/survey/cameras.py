@@ -258,6 +258,7 @@ def check_states(files, name, parameters):
     unused = []
     for parameter in parameters:
         section = f"adjustment.camera.{parameter.setting}"
+        setting = files.values["adjustment.camera"][parameter.setting] or ""
         state = f"{parameter.scope} {parameter.state}"
         if parameter.scope == "off":
             _warn_held(files, name, parameter)
@@ -269,7 +270,7 @@ def check_states(files, name, parameters):
                     asked=state,
                 )
                 files.tell_key(files.log.problem, "cameras", name, parameter.sd_key, expected)
-        elif parameter.sd == 0 and parameter.is_own and _asks_free(files, parameter):
+        elif parameter.sd == 0 and parameter.is_own and setting.endswith("free"):
             expected = message(
                 "held_and_free",
                 "found 0, which holds the parameter fixed, but {section} has it free; "
@@ -288,11 +289,6 @@ def check_states(files, name, parameters):
             example=f'{unused[0].setting} = "{unused[0].scope} weighted"',
         )
         files.tell_key(files.log.warning, "cameras", name, unused[0].sd_key, expected)
-
-
-def _asks_free(files, parameter):
-    value = files.values["adjustment.camera"][parameter.setting]
-    return value is not None and value.endswith("free")
 
 
 def _warn_held(files, name, parameter):

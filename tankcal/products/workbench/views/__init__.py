@@ -31,17 +31,19 @@ import traitlets
 
 from tankcal.errors import HeightError, InputError, TankcalError
 from tankcal.job.contract.overrulings import DECISIONS
-from tankcal.products.desk.result_pages import table_page, wall_page, whole_page
-from tankcal.products.desk.tables import NUMBER
-from tankcal.products.desk.ticket_form import FORM, answer_html, ticket_entry
-from tankcal.products.desk.what_if import (
+from tankcal.products.desk.calculators import (
+    FORM,
     LARGEST,
     STEP,
     STYLE,
+    answer_html,
     budget_sentences,
     change_budget,
     table_html,
+    ticket_entry,
 )
+from tankcal.products.desk.result_pages import table_page, wall_page, whole_page
+from tankcal.products.desk.tables import NUMBER
 from tankcal.products.quantity.chain import STATES
 from tankcal.products.quantity.reading import read_tickets
 from tankcal.products.quantity.table import table_of

@@ -1,1 +1,0 @@
-"""Tools of all commands: language and output of the terminal, arguments, signals."""
