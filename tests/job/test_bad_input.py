@@ -50,7 +50,7 @@ BAD_SETTINGS = [
     ("table.step_m", 0, "above 0"),
     ("table.step_m", -0.01, "above 0"),
     ("table.step_m", 10, "millimetres?"),
-    ("table.step_m", 1e-5, "rows in the table"),
+    ("table.step_m", 1e-5, "a step of 0.00038 m or more"),
     ("table.coverage_probability", 95, "from 0.5 to 0.9999"),
     ("table.liquid_density_kg_m3", 0.85, "in g/cm3?"),
     ("table.minimum_delivery_m", 20.0, "at most the height of the tank, 9.5 m"),

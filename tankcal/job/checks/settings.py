@@ -6,6 +6,7 @@ A value finer than any reading causes a warning, because error-free readings may
 value that is possible only in another unit is a problem.
 """
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -141,9 +142,10 @@ def _check_step(step, table, height, raw, log):
     elif height / step > MAX_TABLE_ROWS:
         expected = message(
             "table_too_long",
-            "{rows:.0f} rows in the table, expected at most {most}",
+            "{rows:.0f} rows in the table, expected at most {most}: a step of {least:g} m or more",
             rows=height / step,
             most=MAX_TABLE_ROWS,
+            least=math.ceil(1e5 * height / MAX_TABLE_ROWS) / 1e5,
         )
         tell(log.problem, raw, "table", key, expected)
     elif step > COARSE_STEP_M:
