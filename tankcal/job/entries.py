@@ -425,7 +425,7 @@ def _column(table, field, log):
                     message(
                         "blank_cell",
                         "blank; expected {expectation}",
-                        expectation=field.expectation(),
+                        expectation=field.expectation,
                     ),
                     row,
                     field.name,

@@ -198,7 +198,7 @@ def read_value(field, raw, decimal=None):
                 "complaint",
                 "{complaint}; expected {expected}",
                 complaint=raw.complaint,
-                expected=field.expectation(),
+                expected=field.expectation,
             )
         )
     reader = {
@@ -223,7 +223,7 @@ def _refusal(field, found, hint=""):
             "found_expected",
             "found {found}; expected {expected}{hint}",
             found=found,
-            expected=field.expectation(),
+            expected=field.expectation,
             hint=hint,
         )
     )
@@ -411,7 +411,7 @@ def _read_numbers(field, raw, decimal):
                 "found {found}; expected 1 to {most} {expected}",
                 found=shown(raw),
                 most=MAX_LIST,
-                expected=field.expectation(),
+                expected=field.expectation,
             )
         )
     is_text = isinstance(raw, str)
@@ -472,7 +472,7 @@ def _read_dms(field, raw, _decimal):
                 "expected_text_of",
                 "found {found}; expected the text of {expected}",
                 found=_kind_of(raw),
-                expected=field.expectation(),
+                expected=field.expectation,
             )
         )
     match = _DMS.fullmatch(raw.replace("\u00a0", " ").strip())

@@ -10,6 +10,7 @@ built.
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from math import inf
 
 from tankcal.messages import message
@@ -89,6 +90,7 @@ class Field:
             return not self.kinds or tank_kind in self.kinds
         return tank_kind in self.required_for
 
+    @cached_property
     def expectation(self):
         """Accepted values in words: "a number above 0, at most 300"."""
         if self.kind == "choice":
@@ -134,10 +136,10 @@ class Field:
     def wanted(self):
         """Meaning and accepted values in words: "height of the course (a number above 0)"."""
         if not self.note:  # the notes of a product may be in the words of each language
-            return self.expectation()
+            return self.expectation
         if self.kind in ("text", "name", "tank id"):
             return message("noted", "{note}", note=self.note)
-        return message("wanted", "{note} ({expected})", note=self.note, expected=self.expectation())
+        return message("wanted", "{note} ({expected})", note=self.note, expected=self.expectation)
 
     def _expected_number(self):
         number = message("a_number", "a number{bounds}", bounds=self._bounds())

@@ -406,7 +406,7 @@ def _explain_fraction(field, value):
         "plan_not_whole",
         "found {found:g}; expected {expected}",
         found=value,
-        expected=field.expectation(),
+        expected=field.expectation,
     )
 
 

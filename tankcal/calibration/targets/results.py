@@ -690,7 +690,7 @@ def _read_rows(path, fields, log):
                         message(
                             "targets_blank",
                             "blank; expected {expected}",
-                            expected=column.expectation(),
+                            expected=column.expectation,
                         )
                     )
                 values.append(read_value(column, cells[place], table.decimal))

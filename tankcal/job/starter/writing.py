@@ -331,7 +331,7 @@ def _note(texts, field, text, is_to_fill_in):
     """Note of a key; for a key to be filled in, with this request and the choices."""
     if not is_to_fill_in:
         return text
-    choices = f" ({say(texts.words, field.expectation())})" if field.kind == "choice" else ""
+    choices = f" ({say(texts.words, field.expectation)})" if field.kind == "choice" else ""
     return f"{texts.of('files', 'fill_in')}: {text}{choices}"
 
 

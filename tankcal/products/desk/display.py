@@ -217,7 +217,7 @@ class Reader:
             return ", ".join(field.choices)
         if field.kind == "choice" or (field.choices and field.kind != "number"):
             return ", ".join(self.texts.choice(choice) for choice in field.choices)
-        return self.say(field.expectation())
+        return self.say(field.expectation)
 
     def _show_keys(self, draft, check, name, every_key):
         """`ShownTable` of the settings or of a list."""

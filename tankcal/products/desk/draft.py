@@ -638,32 +638,29 @@ class Draft:
         dict
             {(row, heading): Mark} of the cells whose text is not accepted.
         """
-        marks = {}
-        for row, column in places:
-            problem = self._problem_of_cell(name, row, column)
-            if problem is not None:
-                marks[row, column] = Mark(BAD, problem)
-        return marks
-
-    def _problem_of_cell(self, name, row, column):
-        """Problem of a filled cell that its field does not accept, or None."""
         if name in self.keys:
-            file, field = self.keys[name].file, field_of(name, row, column)
+            file, decimal = self.keys[name].file, "."
             entries = {(entry.owner, entry.key): entry.text for entry in self.keys[name].entries}
-            raw, decimal = entries.get((row, column), ""), "."
+            cells = ((field_of(name, *place), entries.get(place, "")) for place in places)
         else:
-            table = self.tables[name]
-            file, field, decimal = table.file, self.fields(name).get(column), table.decimal
-            raw = table.rows[row].cells[table.headings.index(column)]
-        if isinstance(raw, AmbiguousNumber):
-            return Problem(file, AMBIGUOUS, None, column)
-        if field is None or not raw.strip():
-            return None
-        try:
-            read_value(field, raw, decimal)
-        except Refused as refusal:
-            return Problem(file, refusal.text, None, column)
-        return None
+            table, fields = self.tables[name], self.fields(name)  # once, not for each pasted cell
+            file, decimal = table.file, table.decimal
+            columns = {heading: column for column, heading in enumerate(table.headings)}
+            cells = (
+                (fields.get(heading), table.rows[row].cells[columns[heading]])
+                for row, heading in places
+            )
+        marks = {}
+        for place, (accepted, raw) in zip(places, cells, strict=True):
+            text = AMBIGUOUS if isinstance(raw, AmbiguousNumber) else None
+            if text is None and accepted is not None and raw.strip():
+                try:
+                    read_value(accepted, raw, decimal)
+                except Refused as refusal:
+                    text = refusal.text
+            if text is not None:
+                marks[place] = Mark(BAD, Problem(file, text, None, place[1]))
+        return marks
 
     def check(self):
         """Check the job in its edited state, and return a `Check` with all problems by cell."""

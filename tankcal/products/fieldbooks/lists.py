@@ -156,7 +156,7 @@ def refuse_missing(foreign_list):
             "no heading for {column} ({note}); expected --column 'HEADING={column}', where "
             "HEADING is one of {headings}",
             column=field.name,
-            note=field.expectation(),
+            note=field.expectation,
             headings=foreign_list.unused or [*foreign_list.table.headings],
         )
         log.problem(foreign_list.table.file, text, foreign_list.table.heading_row)

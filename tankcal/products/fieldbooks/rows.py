@@ -326,7 +326,7 @@ def check_rows(tables, log):
                         expected = message(
                             "imported_blank",
                             "not in the file; expected {wanted}",
-                            wanted=field.expectation(),
+                            wanted=field.expectation,
                         )
                         log.problem(row.file, expected, row.row, f"{table}.{field.name}")
                     continue
