@@ -20,6 +20,7 @@ from tankcal.messages import message
 from tankcal.survey.measurements import RejectedReadings
 from tankcal.survey.observations import KINDS, Source
 from tankcal.survey.results import RepeatedReadings
+from tankcal.survey.wall_hits import certified_distance_m
 
 EARTH_RADIUS_M = 6_371_000.0
 
@@ -52,11 +53,6 @@ class Numbers:
 def bend_per_m(refraction):
     """Earth curvature less refraction, (1 - k) / (2 R), 1/m; multiply by the distance squared."""
     return 0.0 if refraction is None else (1.0 - refraction) / (2.0 * EARTH_RADIUS_M)
-
-
-def certified_distance_m(reading_m, tool):
-    """Distance after an instrument's certificate: (reading + correction_m) (1 + correction), m."""
-    return (np.asarray(reading_m) + tool.correction_m) * (1.0 + tool.correction)
 
 
 def true_distance_m(reading_m, tool, temperature_c):

@@ -26,8 +26,7 @@ from tankcal.errors import SolutionError
 from tankcal.geometry.rotations import apply_small_rotation, vector_derivatives
 from tankcal.messages import message
 from tankcal.survey.beams import by_turn
-from tankcal.survey.readings import certified_distance_m
-from tankcal.survey.wall_hits import FRAME, NETWORK, RangingInstrument
+from tankcal.survey.wall_hits import FRAME, NETWORK, RangingInstrument, certified_distance_m
 
 
 @dataclass(frozen=True)

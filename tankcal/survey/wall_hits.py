@@ -23,7 +23,6 @@ from tankcal.covariance import PointCovariance
 from tankcal.geometry.circles import taubin_circle
 from tankcal.messages import message
 from tankcal.survey.points import Points
-from tankcal.survey.readings import certified_distance_m
 from tankcal.survey.results import Cause
 
 MOST_HITS = 25_000  # largest number that was verified, see docs/studies/sizes.md
@@ -375,6 +374,11 @@ def sight(hits, poses, estimated_m=None, incidence=None):
 
 def _file_rows(hits):
     return hits.rows or range(1, len(hits) + 1)
+
+
+def certified_distance_m(reading_m, tool):
+    """Distance after an instrument's certificate: (reading + correction_m) (1 + correction), m."""
+    return (np.asarray(reading_m) + tool.correction_m) * (1.0 + tool.correction)
 
 
 def certified_m(hits):

@@ -35,7 +35,7 @@ from tankcal.methods.clouds.cluster import (
     open_client,
     report_failures,
 )
-from tankcal.survey.readings import certified_distance_m
+from tankcal.survey.wall_hits import certified_distance_m
 
 TOLD_EVERY_S = 0.5  # s between two reports of progress
 # Fewest points and cores for which local workers are faster: docs/clouds.md.
