@@ -488,7 +488,7 @@ def verdict_of(job, body, table, intervals, simulation):
     """
     if job.rule is None:
         return None
-    printed = _print_U(intervals, simulation)
+    printed = _make_printed_U(intervals, simulation)
     return judge(
         job.rule,
         table,
@@ -502,7 +502,7 @@ def verdict_of(job, body, table, intervals, simulation):
     )
 
 
-def _print_U(intervals, simulation):
+def _make_printed_U(intervals, simulation):
     """`rules.PrintedU` of the rows and of the simulated deliveries."""
     if simulation is None:
         return PrintedU(intervals.U_m3)

@@ -126,7 +126,7 @@ def _typeset(files, blocks, timestamp, again):
             for block in blocks
         ]
         draft = _compile(files | _block_file(sampled), timestamp)
-        _forget()
+        _discard_cache()
         return_freed_memory()
         if content := compose_pages(draft, composed):
             return content
@@ -134,7 +134,7 @@ def _typeset(files, blocks, timestamp, again):
     with _ALONE if long else nullcontext():
         content = _compile(files | _block_file(blocks), timestamp)
         if long and not again:
-            _forget()
+            _discard_cache()
     return content
 
 
@@ -216,7 +216,7 @@ def _compile_in(folder, timestamp):
         raise TankcalError(f"the PDF cannot be set: {error.message}") from error
 
 
-def _forget():
+def _discard_cache():
     """Let the typesetter discard its cache, which holds a gigabyte for a long table."""
     import typst
 

@@ -412,7 +412,7 @@ def test_what_is_kept_of_a_long_table_is_forgotten(rows, again, forgets, monkeyp
     done = []
     monkeypatch.setattr(pdf_of, "LONG", 3)
     monkeypatch.setattr(pdf_of, "_compile", lambda files, timestamp: b"%PDF")
-    monkeypatch.setattr(pdf_of, "_forget", lambda: done.append("forgot"))
+    monkeypatch.setattr(pdf_of, "_discard_cache", lambda: done.append("forgot"))
     table = blocks.table(["a"], [["1"]] * rows).data
     assert pdf_of.pdf([blocks.document(title="t").data, table], again=again) == b"%PDF"
     assert len(done) == forgets

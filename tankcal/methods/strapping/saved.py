@@ -282,15 +282,15 @@ STRAPPED_COURSES = Table(
 
 def straps_of(record):
     """Return `STRAPS` with the headings for the tank; a horizontal tank has rings."""
-    return _with_headings_of_tank(STRAPS, record)
+    return _adapt_headings(STRAPS, record)
 
 
 def strapped_courses_of(record):
     """Return `STRAPPED_COURSES` with the headings for the tank."""
-    return _with_headings_of_tank(STRAPPED_COURSES, record)
+    return _adapt_headings(STRAPPED_COURSES, record)
 
 
-def _with_headings_of_tank(table, record):
+def _adapt_headings(table, record):
     if record["job"]["tank"]["kind"] != "horizontal":
         return table
     return table.but(
